@@ -1,0 +1,2 @@
+//! The `ridgeway` command.
+fn main() {}
