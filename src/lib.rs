@@ -18,7 +18,7 @@ pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{DistanceMap, Solver, StartRegion};
 pub use error::{Error, Result};
 pub use grid::{Ground, GridFrame};
-pub use metric::{Delta, Metric, MetricField};
+pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
 pub use route::{Comparison, Route};
 pub use surface::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
 pub use terrain::{Crs, Terrain};

@@ -128,6 +128,12 @@ impl HeightSurface {
 
     /// How far the surface lies from the heights.
     #[must_use]
+    pub fn rms_curvature(&self) -> f64 {
+        todo!()
+    }
+
+    /// How far the surface lies from the heights.
+    #[must_use]
     pub fn residuals(&self) -> Residuals {
         todo!()
     }
