@@ -66,7 +66,8 @@ impl TensorField {
     /// Cancelled.
     pub fn sample(metric: &MetricField<'_>, control: &Control) -> Result<Self> {
         let frame = metric.surface().frame();
-        let sample_rows = |rows: std::ops::Range<usize>, visit: &mut dyn FnMut(usize, usize, Sym2)| {
+        let sample_rows = |rows: std::ops::Range<usize>,
+                           visit: &mut dyn FnMut(usize, usize, Sym2)| {
             let mut jets = vec![HeightJet::default(); frame.cols()];
             let mut speeds = vec![Sym2::default(); frame.cols()];
             for row in rows {
@@ -91,7 +92,8 @@ impl TensorField {
         tensor: impl Fn(usize, usize) -> Option<Sym2> + Sync,
         control: &Control,
     ) -> Result<Self> {
-        let sample_rows = |range: std::ops::Range<usize>, visit: &mut dyn FnMut(usize, usize, Sym2)| {
+        let sample_rows = |range: std::ops::Range<usize>,
+                           visit: &mut dyn FnMut(usize, usize, Sym2)| {
             for row in range {
                 for col in 0..cols {
                     if let Some(d) = tensor(col, row) {
@@ -168,15 +170,19 @@ impl TensorField {
     }
 
     /// Stored metric at grid coordinates: bilinear over the open corners of the cell; `None` if all are closed.
-    pub(super) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
-        let corner = |value: f64, count: usize| (value.floor() as usize).min(count.saturating_sub(2));
+    pub(crate) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
+        let corner =
+            |value: f64, count: usize| (value.floor() as usize).min(count.saturating_sub(2));
         let (col, row) = (corner(at.x, self.cols()), corner(at.y, self.rows()));
         let (u, v) = (at.x - col as f64, at.y - row as f64);
         let mut sum = Sym2::default();
         let mut weight = 0.0;
-        for (i, j, w) in
-            [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
-        {
+        for (i, j, w) in [
+            (0, 0, (1.0 - u) * (1.0 - v)),
+            (1, 0, u * (1.0 - v)),
+            (0, 1, (1.0 - u) * v),
+            (1, 1, u * v),
+        ] {
             if col + i < self.cols()
                 && row + j < self.rows()
                 && let Some(metric) = self.metric(col + i, row + j)

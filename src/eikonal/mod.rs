@@ -6,6 +6,7 @@
 //! beyond rounding and the variation of the metric within a cell. Walls one node thick do not leak, also
 //! diagonally. Cost: some 50 ns and 16 bytes per node. [`reference`] is the slow judge.
 
+mod cell;
 mod field;
 pub mod reference;
 mod source;
@@ -16,6 +17,8 @@ use glam::DVec2;
 
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
+#[cfg(test)]
+pub(crate) use self::source::sees;
 pub use self::tiles::Statistics;
 use self::tiles::Values;
 use self::update::{RING, UNREACHED, segment};
@@ -177,16 +180,21 @@ impl DistanceMap {
             return None;
         }
         let node = DVec2::new(col as f64, row as f64);
-        if let Some((foot, _)) = self.start.foot(&self.field, node, SEED_SIGHT) {
+        if let Some(foot) = self.straight_home(node, self.stored(col, row)) {
             return Some(foot - node);
         }
         best_foot(&self.field, &self.values, col, row).map(|(_, foot)| foot)
     }
 
+    /// The point of the start region to go to straight from `at`, if that is the shortest way.
+    pub(crate) fn straight_home(&self, at: DVec2, value: f64) -> Option<DVec2> {
+        /// The values of nodes are rounded to `f32`.
+        const SLACK: f64 = 1.0 + 1e-6;
+        let (foot, length) = self.start.foot(&self.field, at, SEED_SIGHT)?;
+        (length <= SLACK * value).then_some(foot)
+    }
+
     pub(crate) fn stored_at(&self, at: DVec2) -> Option<f64> {
-        if let Some((_, length)) = self.start.foot(&self.field, at, SEED_SIGHT) {
-            return Some(length);
-        }
         let outside = at.x < 0.0
             || at.y < 0.0
             || at.x > (self.cols() - 1) as f64
@@ -194,11 +202,23 @@ impl DistanceMap {
         if outside || !at.is_finite() {
             return None;
         }
+        let straight = self.start.foot(&self.field, at, SEED_SIGHT).map(|(_, length)| length);
+        straight.into_iter().chain(self.interpolated(at)).min_by(f64::total_cmp)
+    }
+
+    /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.
+    fn interpolated(&self, at: DVec2) -> Option<f64> {
         let (col, row) = (at.x as usize, at.y as usize);
         let (u, v) = (at.x - col as f64, at.y - row as f64);
-        let corners =
-            [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)];
-        let used = || corners.iter().filter(|corner| corner.2 > 0.0).map(|&(i, j, w)| (col + i, row + j, w));
+        let corners = [
+            (0, 0, (1.0 - u) * (1.0 - v)),
+            (1, 0, u * (1.0 - v)),
+            (0, 1, (1.0 - u) * v),
+            (1, 1, u * v),
+        ];
+        let used = || {
+            corners.iter().filter(|corner| corner.2 > 0.0).map(|&(i, j, w)| (col + i, row + j, w))
+        };
         if used().all(|(c, r, _)| self.is_reached(c, r)) {
             return Some(used().map(|(c, r, w)| w * self.stored(c, r)).sum());
         }
@@ -212,7 +232,7 @@ impl DistanceMap {
     }
 }
 
-/// Within this many cells of the start, distance and direction are those of the straight way to it.
+/// Within this many cells of the start the straight way to it is considered.
 const SEED_SIGHT: f64 = 4.0;
 
 /// Least value of a node over its ring, with the step to the point of the ring it came from.
@@ -252,3 +272,6 @@ fn best_foot(field: &TensorField, values: &Values, col: usize, row: usize) -> Op
     }
     best
 }
+
+#[cfg(test)]
+mod tests;

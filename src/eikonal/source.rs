@@ -41,10 +41,11 @@ impl StartRegion {
     #[must_use]
     pub fn covers(&self, at: DVec2) -> bool {
         self.areas.iter().any(|rings| {
-            let crossings = rings.iter().flat_map(|ring| closed_segments(ring)).filter(|&(a, b)| {
-                (a.y > at.y) != (b.y > at.y)
-                    && at.x < a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x)
-            });
+            let crossings =
+                rings.iter().flat_map(|ring| closed_segments(ring)).filter(|&(a, b)| {
+                    (a.y > at.y) != (b.y > at.y)
+                        && at.x < a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x)
+                });
             crossings.count() % 2 == 1
         })
     }
@@ -81,7 +82,8 @@ impl StartRegion {
 
     /// Segments of the lines and of the borders of the areas.
     fn segments(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
-        let lines = self.lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1])));
+        let lines =
+            self.lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1])));
         lines.chain(self.areas.iter().flatten().flat_map(|ring| closed_segments(ring)))
     }
 
@@ -150,7 +152,7 @@ fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
 }
 
 /// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones.
-pub(super) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
+pub(crate) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
     /// Samples per cell of length: a wall in a cell is crossed by more than one of them or hardly touched.
     const DENSITY: f64 = 8.0;
     let steps = (a.distance(b) * DENSITY).ceil().max(1.0);
@@ -167,9 +169,10 @@ pub(super) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
 
 /// In a cell with closed corners: whether the way stays on the side of its own end's corner.
 fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) -> bool {
-    // The nearest corner must be open, ...
-    let nearest = usize::from(at.x > 0.5) + 2 * usize::from(at.y > 0.5);
-    if !corners[nearest] {
+    // The nearest corner, or one of the nearest, must be open, ...
+    let distance = |i: usize| at.distance_squared(DVec2::new((i % 2) as f64, (i / 2) as f64));
+    let nearest = (0..4).map(distance).fold(f64::INFINITY, f64::min);
+    if !(0..4).any(|i| corners[i] && distance(i) <= nearest + 1e-9) {
         return false;
     }
     // ... and where a wall runs along a diagonal, the whole way must lie on one side of it.

@@ -135,9 +135,8 @@ impl Queue {
         let key = &self.key;
         let mut candidates: Vec<u32> =
             self.waiting.iter().copied().filter(|&t| key[t as usize] <= limit).collect();
-        candidates.sort_unstable_by(|&a, &b| {
-            key[a as usize].total_cmp(&key[b as usize]).then(a.cmp(&b))
-        });
+        candidates
+            .sort_unstable_by(|&a, &b| key[a as usize].total_cmp(&key[b as usize]).then(a.cmp(&b)));
         for tile in candidates {
             if self.taken[tile as usize] == round {
                 continue;
@@ -198,7 +197,10 @@ pub(super) fn solve(
             bench.solve(field, values, tile, queue.heading[tile as usize], tolerance)
         };
         if rayon::current_num_threads() > 1 && taken.len() >= MIN_PARALLEL {
-            taken.par_iter().map_init(Workbench::default, solve_one).collect_into_vec(&mut outcomes);
+            taken
+                .par_iter()
+                .map_init(Workbench::default, solve_one)
+                .collect_into_vec(&mut outcomes);
         } else {
             let mut bench = Workbench::default();
             outcomes.clear();
@@ -322,13 +324,7 @@ impl Workbench {
         for (row, line) in after.chunks_exact_mut(SIDE).enumerate() {
             line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
         }
-        Outcome {
-            tile,
-            wakes: wakes(&before, &after),
-            values: after,
-            sweeps,
-            settled,
-        }
+        Outcome { tile, wakes: wakes(&before, &after), values: after, sweeps, settled }
     }
 }
 

@@ -122,7 +122,13 @@ pub(crate) type Block = [[f32; BLOCK]; BLOCK];
 
 impl Bench {
     /// Puts a tile on the bench. A relative change of `tolerance` of a node's shortest step is small.
-    pub(crate) fn load(&mut self, tensors: &TensorTile, block: &Block, mirrored: bool, tolerance: f32) {
+    pub(crate) fn load(
+        &mut self,
+        tensors: &TensorTile,
+        block: &Block,
+        mirrored: bool,
+        tolerance: f32,
+    ) {
         self.mirrored = mirrored;
         self.load_values(block);
         let turn = if mirrored { -1.0 } else { 1.0 };
@@ -131,7 +137,13 @@ impl Bench {
             let of = |values: &[f32; AREA]| -> [f32; SIDE] {
                 std::array::from_fn(|col| values[row * SIDE + col])
             };
-            let line = row_coefficients(of(&tensors.xx), of(&tensors.xy), of(&tensors.det), turn, tolerance);
+            let line = row_coefficients(
+                of(&tensors.xx),
+                of(&tensors.xy),
+                of(&tensors.det),
+                turn,
+                tolerance,
+            );
             for col in 0..SIDE {
                 let to = &mut self.coefficients[col + lane];
                 to.xx[lane] = line.xx[col];
@@ -206,7 +218,8 @@ fn row_coefficients(
             k.ixx[i] = 1.0 / xx[i];
             k.iyy[i] = 1.0 / yy;
             [k.east[i], k.south[i], k.rising[i], k.falling[i]] = steps;
-            k.tolerance[i] = tolerance * least(least(steps[0], steps[1]), least(steps[2], steps[3]));
+            k.tolerance[i] =
+                tolerance * least(least(steps[0], steps[1]), least(steps[2], steps[3]));
         }
     }
     k

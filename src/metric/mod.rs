@@ -173,11 +173,7 @@ fn check_tensors(surface: &HeightSurface, tensors: &[Sym2]) -> Result<()> {
     }
 }
 
-fn open_nodes(
-    surface: &HeightSurface,
-    speed: &Speed,
-    modifiers: &Modifiers,
-) -> Result<Vec<bool>> {
+fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> Result<Vec<bool>> {
     let frame = surface.frame();
     let barrier = modifiers.barrier.as_deref();
     if let Some(barrier) = barrier
