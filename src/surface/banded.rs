@@ -140,7 +140,8 @@ mod tests {
 
     fn times(a: &Banded, x: &[f64]) -> Vec<f64> {
         let n = x.len();
-        let entry = |i: usize, j: usize| a.rows[i.max(j)].get(i.abs_diff(j)).copied().unwrap_or(0.0);
+        let entry =
+            |i: usize, j: usize| a.rows[i.max(j)].get(i.abs_diff(j)).copied().unwrap_or(0.0);
         (0..n).map(|i| (0..n).map(|j| entry(i, j) * x[j]).sum()).collect()
     }
 

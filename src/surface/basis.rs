@@ -46,6 +46,11 @@ impl Basis {
         Self { degree, intervals, density }
     }
 
+    /// Degree of the splines.
+    pub(super) fn degree(&self) -> usize {
+        self.degree
+    }
+
     /// Number of coefficients.
     pub(super) fn len(&self) -> usize {
         self.intervals + 1

@@ -7,11 +7,13 @@
 //! ```
 //!
 //! A wave `sin ωt` keeps the share `1/(1 + λω⁶)` of its amplitude, so `λ = (L/2π)⁶` halves the waves of
-//! length `L`.
+//! length `L`; for waves of a few cells the spline's own symbols stand in for `ω⁶`.
 //!
 //! The third derivative is penalised for both degrees. The usual smoothing spline of degree 3 penalises
 //! the second; its solution has `s″ = 0` at the border, and a surface without curvature in a margin as
 //! wide as the cut-off. With the third, polynomials of degree 2 are reproduced and curvature is left alone.
+
+use std::f64::consts::TAU;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -27,10 +29,10 @@ const STAGE: &str = "fitting surface";
 /// spline's own error in the second derivative of a wave of that length, `(ωh)²/12`, is 1.3 %.
 const KNOTS_PER_CUTOFF: f64 = 16.0;
 
-/// Longest cut-off in knot intervals. It bounds the condition of the normal equations at about `10¹¹`;
-/// it is met only beyond eight times the extent of the grid, where all is a quadratic anyway, and in
-/// rows near a pole.
-const LONGEST_CUTOFF: f64 = 135.0;
+/// Longest cut-off in knot intervals. It bounds the condition of the normal equations at about `10⁹`. It
+/// is met only by cut-offs of over twelve times the extent of the grid, where all is a quadratic anyway, and in
+/// rows towards a pole whose cells are less than a quarter as wide as the widest.
+const LONGEST_CUTOFF: f64 = 64.0;
 
 /// Columns that are solved together.
 pub(super) const LANES: usize = 16;
@@ -59,8 +61,7 @@ impl Plan {
             (intervals.ceil() as usize).max(degree).min(nodes - 1)
         };
         let widest = (0..frame.rows()).map(|r| frame.spacing(r as f64).x).fold(0.0, f64::max);
-        let intervals =
-            [needed(frame.cols(), widest), needed(frame.rows(), frame.mid_spacing().y)];
+        let intervals = [needed(frame.cols(), widest), needed(frame.rows(), frame.mid_spacing().y)];
         Self { degree, intervals, cutoff }
     }
 
@@ -112,19 +113,41 @@ impl Axis {
         penalty
     }
 
-    /// `L/2π` in nodes for a cut-off of `cells` nodes, kept where the equations are sound.
-    fn length(&self, cells: f64) -> f64 {
+    /// A cut-off of `cells` nodes, in knot intervals, kept where the equations are sound.
+    fn cutoff(&self, cells: f64) -> f64 {
         // Fewer knots than nodes without smoothing may leave a coefficient almost without data where
         // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and is not felt otherwise.
         let shortest = if self.basis.len() < self.nodes.len() { 0.3 } else { 0.0 };
-        cells.clamp(shortest / self.basis.density(), LONGEST_CUTOFF / self.basis.density())
-            / std::f64::consts::TAU
+        (cells * self.basis.density()).clamp(shortest, LONGEST_CUTOFF)
+    }
+
+    /// `λ` for a cut-off of `cells` nodes: the quotient of the symbols of normal and penalty matrix at that wave,
+    ///
+    /// ```text
+    ///   λ = b(ω)² / ((2 sin ω/2)⁶ r(ω)) ,     b(ω) = Σ_k N(k) cos kω ,     ω = 2π/L per knot
+    /// ```
+    ///
+    /// with `r = 1` for degree 3 and `r = b` for degree 5, from third differences and the products of the
+    /// B-splines they are coefficients of. For long waves it is `(L/2π)⁶`.
+    fn smoothing(&self, cells: f64) -> f64 {
+        let cutoff = self.cutoff(cells);
+        // No wave on the knots is shorter than two of them.
+        let wave = cutoff.max(2.0);
+        let omega = TAU / wave;
+        let values = if self.basis.degree() == 3 {
+            (2.0 + omega.cos()) / 3.0
+        } else {
+            (33.0 + 26.0 * omega.cos() + (2.0 * omega).cos()) / 60.0
+        };
+        let r = if self.basis.degree() == 3 { 1.0 } else { values };
+        let lambda = values * values / ((2.0 * (omega / 2.0).sin()).powi(6) * r);
+        lambda * (cutoff / wave / self.basis.density()).powi(6)
     }
 
     /// Factors of the normal matrix for a cut-off of `cells` nodes.
     fn normal(&self, penalty: &Banded, cells: f64) -> Ldl {
         let mut normal = self.gram.clone();
-        normal.add(penalty, self.length(cells).powi(6));
+        normal.add(penalty, self.smoothing(cells));
         normal.factor(self.basis.support() - 1)
     }
 
@@ -158,7 +181,12 @@ impl Axis {
     ///
     /// With few values a lower derivative is penalised, so that what lies beyond them is a line or a
     /// constant and not a parabola through noise.
-    pub(super) fn complete(&self, penalties: &[Banded; 3], cells: f64, line: &[f64]) -> Option<Vec<f64>> {
+    pub(super) fn complete(
+        &self,
+        penalties: &[Banded; 3],
+        cells: f64,
+        line: &[f64],
+    ) -> Option<Vec<f64>> {
         let order = match line.iter().filter(|z| z.is_finite()).count() {
             0 => return None,
             1 => 1,
@@ -173,7 +201,8 @@ impl Axis {
             normal.add_outer(node.start, weights, 1.0);
             x[node.start..].iter_mut().zip(weights).for_each(|([x], w)| *x += w * z);
         }
-        normal.add(&penalties[order - 1], self.length(cells).powi(2 * order as i32));
+        let length = self.cutoff(cells) / self.basis.density() / TAU;
+        normal.add(&penalties[order - 1], length.powi(2 * order as i32));
         normal.factor(support - 1).solve(&mut x);
         let x = x.as_flattened();
         Some(self.nodes.iter().map(|n| dot(&n.weights[0][..support], &x[n.start..])).collect())
@@ -202,7 +231,13 @@ impl Fit {
         solve_rows(frame, &x, plan.cutoff, &mut heights, control)?;
         keep_leading(&mut heights, frame.cols(), x.basis.len());
         control.report(STAGE, 0.5);
-        solve_columns(&y, plan.cutoff / frame.mid_spacing().y, &mut heights, x.basis.len(), control)?;
+        solve_columns(
+            &y,
+            plan.cutoff / frame.mid_spacing().y,
+            &mut heights,
+            x.basis.len(),
+            control,
+        )?;
         heights.truncate(x.basis.len() * y.basis.len());
         heights.shrink_to_fit();
         control.report(STAGE, 1.0);

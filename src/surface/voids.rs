@@ -139,9 +139,10 @@ fn refill(frame: &GridFrame, fit: &Fit, heights: &[f64], filled: &mut [f64]) -> 
 
 /// Smallest and largest finite height.
 fn range(heights: &[f64]) -> [f64; 2] {
-    heights.iter().filter(|z| z.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &z| {
-        [a.min(z), b.max(z)]
-    })
+    heights
+        .iter()
+        .filter(|z| z.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &z| [a.min(z), b.max(z)])
 }
 
 /// One-dimensional fits to the finite heights of lines along one axis.
