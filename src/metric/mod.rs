@@ -56,7 +56,11 @@ impl Metric {
     ///
     /// # Errors
     /// A `δ` that is not positive and finite, a raster of another size.
-    pub fn on<'a>(&self, surface: &'a HeightSurface, modifiers: &Modifiers) -> Result<MetricField<'a>> {
+    pub fn on<'a>(
+        &self,
+        surface: &'a HeightSurface,
+        modifiers: &Modifiers,
+    ) -> Result<MetricField<'a>> {
         todo!()
     }
 }
