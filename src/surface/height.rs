@@ -207,12 +207,6 @@ impl HeightSurface {
 
     /// How far the surface lies from the heights that are not void.
     #[must_use]
-    pub fn rms_curvature(&self) -> f64 {
-        todo!()
-    }
-
-    /// How far the surface lies from the heights.
-    #[must_use]
     pub fn residuals(&self) -> Residuals {
         self.residuals
     }
