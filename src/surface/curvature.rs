@@ -85,6 +85,16 @@ impl HeightJet {
         }
     }
 
+    /// `κ1² + κ2² = tr (G⁻¹B)² = 4H² − 2K` without the directions, 1/m².
+    pub(super) fn squared_curvature(&self) -> f64 {
+        let [e, f, g] = self.first_form();
+        // det G
+        let area = 1.0 + self.gradient().length_squared();
+        let twice_mean = (self.zxx * g - 2.0 * self.zxy * f + self.zyy * e) / area;
+        let gaussian = (self.zxx * self.zyy - self.zxy * self.zxy) / area;
+        (twice_mean * twice_mean - 2.0 * gaussian) / area
+    }
+
     /// Surface area per plan area, `√(1+|∇z|²)`.
     fn stretch(&self) -> f64 {
         (1.0 + self.gradient().length_squared()).sqrt()
@@ -110,6 +120,8 @@ mod tests {
         assert!(principal[0] >= principal[1]);
         assert!((principal[0] * principal[1] - gaussian).abs() < tolerance);
         assert!((principal[0] + principal[1] - 2.0 * mean).abs() < tolerance);
+        let squares = principal[0].powi(2) + principal[1].powi(2);
+        assert!((jet.squared_curvature() - squares).abs() < tolerance);
     }
 
     #[test]

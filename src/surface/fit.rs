@@ -165,15 +165,27 @@ impl Axis {
 
     /// Right-hand side of the normal equations: `Σ_i v_i z_i`.
     fn project<const W: usize>(&self, heights: impl Iterator<Item = [f64; W]>) -> Vec<[f64; W]> {
-        let mut sums = vec![[0.0; W]; self.basis.len()];
+        match self.basis.support() {
+            4 => self.project_of::<4, W>(heights),
+            _ => self.project_of::<SUPPORT, W>(heights),
+        }
+    }
+
+    fn project_of<const N: usize, const W: usize>(
+        &self,
+        heights: impl Iterator<Item = [f64; W]>,
+    ) -> Vec<[f64; W]> {
+        // The weights beyond a narrow grid's support are 0, but what they are added to must exist.
+        let mut sums = vec![[0.0; W]; self.basis.len().max(N)];
         for (node, z) in self.nodes.iter().zip(heights) {
-            let sums = &mut sums[node.start..node.start + self.basis.support()];
-            for (sum, &weight) in sums.iter_mut().zip(&node.weights[0]) {
+            let sums = &mut sums[node.start..node.start + N];
+            for (sum, &weight) in sums.iter_mut().zip(&node.weights[0][..N]) {
                 for (sum, z) in sum.iter_mut().zip(&z) {
                     *sum += weight * z;
                 }
             }
         }
+        sums.truncate(self.basis.len());
         sums
     }
 

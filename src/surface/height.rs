@@ -233,8 +233,7 @@ impl HeightSurface {
             self.row_jets(row, jets);
             let valid = (0..cols).filter(|&col| !self.is_void(col, row));
             valid.fold((0.0, 0_usize), |(sum, count), col| {
-                let [k1, k2] = jets[col].curvature().principal;
-                (sum + k1 * k1 + k2 * k2, count + 1)
+                (sum + jets[col].squared_curvature(), count + 1)
             })
         };
         let sums: Vec<_> = (0..self.frame.rows())

@@ -12,8 +12,9 @@ use super::banded::Banded;
 use super::fit::{Axis, Fit, LANES, Plan, stripes};
 use crate::{Control, GridFrame, Result};
 
-/// Most refits.
-const ROUNDS: usize = 4;
+/// Most refits. On waves with noise around a hole (the test of heights beside voids) the largest change of
+/// curvature against the fit without a hole is 0.063, 0.057, 0.055 and 0.053 /m after 0, 2, 4 and 100.
+const ROUNDS: usize = 2;
 
 /// Refitting ends once no void moves by more than this share of the range of heights.
 const SETTLED: f64 = 1e-7;
