@@ -132,7 +132,7 @@ impl<'a> MapPicture<'a> {
         };
         items.extend(self.routes.iter().filter_map(|r| line(r.colour, true, &r.label)));
         items.extend(self.isolines.iter().filter_map(|l| line(l.colour, false, &l.label)));
-        if self.barriers.contains(&true) {
+        if self.barriers.iter().zip(self.heights).any(|(&barrier, h)| barrier && h.is_finite()) {
             let colour = Rgb(0xd8, 0xd2, 0xc0).mix(BARRIER, 0.5);
             items.push(Item::Patch { colour: Some(colour), label: "barrier".into() });
         }
