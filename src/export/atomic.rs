@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tempfile::NamedTempFile;
 
@@ -37,6 +37,22 @@ pub fn check_free(path: impl AsRef<Path>, overwrite: bool) -> Result<()> {
         Err(Error::usage(format!("{} exists; give --overwrite to replace it", path.display())))
     } else {
         Ok(())
+    }
+}
+
+/// Whether files of these `names` may be written into `folder`, which may be missing but whose parent
+/// may not: call it before long work.
+///
+/// # Errors
+/// As [`check_free`] for each file; [`Error::Usage`] if `folder` is a file.
+pub fn check_folder_free(folder: impl AsRef<Path>, names: &[&str], overwrite: bool) -> Result<()> {
+    let folder = folder.as_ref();
+    if folder.is_dir() {
+        names.iter().try_for_each(|name| check_free(folder.join(name), overwrite))
+    } else if folder.exists() {
+        Err(Error::usage(format!("{} is a file; a folder is needed", folder.display())))
+    } else {
+        check_free(folder, overwrite)
     }
 }
 
@@ -80,12 +96,7 @@ pub fn write_folder(
     fill: impl FnOnce(&Path) -> Result<()>,
 ) -> Result<()> {
     let path = path.as_ref();
-    if path.exists() && !path.is_dir() {
-        return Err(Error::usage(format!("{} is a file; a folder is needed", path.display())));
-    }
-    if !path.exists() {
-        check_free(path, overwrite)?;
-    }
+    check_folder_free(path, &[], overwrite)?;
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
     let temporary = tempfile::Builder::new()
         .prefix(".ridgeway-")
@@ -133,6 +144,8 @@ fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
 
     fn entries(folder: &Path) -> Vec<PathBuf> {
@@ -202,6 +215,9 @@ mod tests {
         write_folder(&out, false, fill("one")).unwrap();
         fs::write(out.join("foreign"), "mine").unwrap();
         fs::remove_file(out.join("c.txt")).unwrap();
+        assert!(check_folder_free(&out, &["c.txt"], false).is_ok());
+        assert!(check_folder_free(&out, &["b.txt", "c.txt"], false).is_err());
+        assert!(check_folder_free(out.join("b.txt"), &[], true).is_err());
         assert!(write_folder(&out, false, fill("two")).is_err());
         assert_eq!(entries(&out), [PathBuf::from("b.txt"), PathBuf::from("foreign")]);
         assert!(write_folder(&out, true, |_| Err(Error::Cancelled)).is_err());

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::isolines::Isoline;
 use crate::terrain::Crs;
-use crate::{Error, GridFrame, Result, Route};
+use crate::{GridFrame, Result, Route};
 
 /// A feature per `(name, route)` whose properties are `name` and all of the route's summary.
 /// `provenance`, a JSON object, becomes the collection's member of that name: what is needed to make
@@ -15,7 +15,7 @@ use crate::{Error, GridFrame, Result, Route};
 /// Without a CRS the positions are map coordinates, and the member `coordinate_note` says so.
 ///
 /// # Errors
-/// [`Error::Usage`] if only some of the points can be brought to longitude and latitude.
+/// [`Error::Usage`](crate::Error::Usage) if only some of the points can be brought to longitude and latitude.
 pub fn routes_geojson(
     routes: &[(impl AsRef<str>, &Route)],
     crs: &Crs,
@@ -25,7 +25,7 @@ pub fn routes_geojson(
     collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
-/// A feature per level, with the properties `distance` and `unit`; `frame` places the lines.
+/// A feature per level that has lines, with the properties `distance` and `unit`; `frame` places the lines.
 ///
 /// # Errors
 /// As [`routes_geojson`].
@@ -36,7 +36,8 @@ pub fn isolines_geojson(
     crs: &Crs,
     provenance: &Value,
 ) -> Result<String> {
-    let features = isolines.iter().map(|isoline| isoline_feature(isoline, frame, unit)).collect();
+    let drawn = isolines.iter().filter(|isoline| !isoline.lines.is_empty());
+    let features = drawn.map(|isoline| isoline_feature(isoline, frame, unit)).collect();
     collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
@@ -49,7 +50,8 @@ struct Lines {
 fn route_feature(name: &str, route: &Route) -> Lines {
     let mut properties = JsonObject::new();
     properties.insert("name".into(), name.into());
-    if let Ok(Value::Object(summary)) = serde_json::to_value(&route.summary) {
+    let summary = serde_json::to_value(&route.summary).expect("numbers and texts are JSON");
+    if let Value::Object(summary) = summary {
         properties.extend(summary);
     }
     // A route of one point, start and goal being the same, is still a line of two positions.
@@ -164,8 +166,8 @@ fn cut_at_antimeridian(line: &[DVec3]) -> Vec<Vec<DVec3>> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::Ground;
     use crate::route::Summary;
+    use crate::{Error, Ground};
 
     pub(in crate::export) fn route() -> Route {
         Route {

@@ -399,6 +399,19 @@ mod tests {
     }
 
     #[test]
+    fn big_tiff_and_threads_change_no_value() {
+        let frame = frame(600, 2);
+        let classes: Vec<u8> = (0..frame.nodes()).map(|i| (i * i) as u8).collect();
+        let bands = [Band { description: "class", samples: Samples::U8(&classes) }];
+        let mut out = Cursor::new(Vec::new());
+        write::<_, TiffKindBig>(&mut out, &frame, &GeoKeys::default(), &bands).unwrap();
+        let read = Decoder::new(Cursor::new(out.into_inner())).unwrap().read_image().unwrap();
+        assert!(matches!(read, DecodingResult::U8(read) if read == classes));
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(one.install(|| written(&frame, &bands)), written(&frame, &bands));
+    }
+
+    #[test]
     fn keys_of_a_file_are_kept_but_for_pixel_kind_and_heights() {
         let keys = GeoKeys {
             directory: vec![

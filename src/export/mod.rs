@@ -10,7 +10,7 @@ mod gpx;
 mod isolines;
 mod profile;
 
-pub use self::atomic::{check_free, write_file, write_folder};
+pub use self::atomic::{check_folder_free, check_free, write_file, write_folder};
 pub use self::geojson::{isolines_geojson, routes_geojson};
 pub use self::geotiff::{Band, GeoKeys, Samples, write_geotiff};
 pub use self::gpx::routes_gpx;

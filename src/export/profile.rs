@@ -57,7 +57,7 @@ mod tests {
             distance_m: 12.5,
             x: -118.25,
             y: 34_000_100.0,
-            height_m: 1234.567_89,
+            height_m: 1_234.567_89,
             grade_percent: -3.0,
             side_slope_deg: 4.25,
             normal_curvature_per_m: -1.5e-4,

@@ -3,7 +3,7 @@
 use glam::Vec2;
 use rayon::prelude::*;
 use tiny_skia::{
-    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, Transform,
+    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, Transform,
 };
 
 use super::text;
@@ -72,13 +72,6 @@ impl Canvas {
                 pixel.copy_from_slice(&[r, g, b, 255]);
             }
         });
-    }
-
-    /// Fills a rectangle.
-    pub(super) fn rectangle(&mut self, at: Vec2, size: Vec2, colour: Rgb) {
-        if let Some(rect) = Rect::from_xywh(at.x, at.y, size.x, size.y) {
-            self.fill(&PathBuilder::from_rect(rect), colour);
-        }
     }
 
     /// Fills a polygon.
@@ -168,6 +161,7 @@ pub(super) fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
     let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
     encoder
         .write_header()
         .and_then(|mut writer| {

@@ -82,7 +82,7 @@ impl<'a> FieldPicture<'a> {
             });
         }
         if self.values.iter().any(|v| !v.is_finite()) {
-            legend.push(Item::Patch { colour: None, label: "none".into() });
+            legend.push(Item::Patch { colour: None, label: "no value".into() });
         }
         let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, legend)?;
         sheet.ground(|grid| {
@@ -141,12 +141,13 @@ impl<'a> FieldPicture<'a> {
 /// Round numbers between `low` and `high`, and their shares of the way.
 fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let step = round_step(high - low, 6);
-    let first = (low / step).ceil();
-    // Six parts at most, whatever rounding does.
+    // An end that all but reaches a round number shows it: distances begin just above 0.
+    let near = 0.01 * (high - low);
+    let first = ((low - near) / step).ceil();
     (0..=6)
         .map(|i| (first + f64::from(i)) * step)
-        .take_while(|v| *v <= high)
-        .map(|v| ((v - low) / (high - low), number(v)))
+        .take_while(|v| *v <= high + near)
+        .map(|v| (((v - low) / (high - low)).clamp(0.0, 1.0), number(v)))
         .collect()
 }
 

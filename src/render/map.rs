@@ -12,6 +12,8 @@ use crate::{Error, GridFrame, Result};
 
 /// Every so many isolines one is thick and labelled.
 const MAJOR: usize = 5;
+/// Size of the labels of isolines, in pixels of a picture of the default size.
+const LABEL: f32 = 17.0;
 /// Barriers are drawn in this colour, mixed half and half with the ground.
 const BARRIER: Rgb = Rgb(0x20, 0x20, 0x28);
 
@@ -93,9 +95,13 @@ impl<'a> MapPicture<'a> {
         }
         let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, self.legend())?;
         self.draw_ground(&mut sheet);
+        let mut labels = Vec::new();
         for layer in &self.isolines {
-            draw_isolines(&mut sheet, layer);
+            labels.extend(draw_isolines(&mut sheet, layer));
         }
+        let on_top = self.routes.iter().flat_map(|r| r.grid).chain(&self.starts).chain(&self.goals);
+        let taken: Vec<_> = on_top.map(|&p| sheet.place(p)).collect();
+        draw_labels(&mut sheet, labels, &taken);
         self.draw_routes(&mut sheet);
         let pins = self.starts.iter().map(|&p| (p, 'S', Rgb::GREEN));
         for (at, letter, colour) in pins.chain(self.goals.iter().map(|&p| (p, 'G', Rgb::PURPLE))) {
@@ -126,7 +132,7 @@ impl<'a> MapPicture<'a> {
         };
         items.extend(self.routes.iter().filter_map(|r| line(r.colour, true, &r.label)));
         items.extend(self.isolines.iter().filter_map(|l| line(l.colour, false, &l.label)));
-        if self.barriers.contains(&true) {
+        if self.barriers.iter().zip(self.heights).any(|(&barrier, h)| barrier && h.is_finite()) {
             let colour = Rgb(0xd8, 0xd2, 0xc0).mix(BARRIER, 0.5);
             items.push(Item::Patch { colour: Some(colour), label: "barrier".into() });
         }
@@ -161,22 +167,57 @@ impl<'a> MapPicture<'a> {
     }
 }
 
-/// Thin lines, every fifth thicker and with its value.
-fn draw_isolines(sheet: &mut Sheet, layer: &IsolineLayer<'_>) {
-    let mut labels: Vec<(Vec2, String)> = Vec::new();
+/// A value written on its isoline.
+struct Label {
+    middle: Vec2,
+    half: Vec2,
+    text: String,
+    colour: Rgb,
+}
+
+/// Thin lines, every fifth thicker; and where along each thick one its label may go, best first.
+fn draw_isolines(sheet: &mut Sheet, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>> {
+    let mut labels = Vec::new();
     for (i, isoline) in layer.isolines.iter().enumerate() {
         let lines = sheet.lines(&isoline.lines);
         let major = (i + 1) % MAJOR == 0;
         let (width, opacity) = if major { (2.2, 0.8) } else { (1.1, 0.6) };
         sheet.canvas.lines(&lines, width * sheet.unit, layer.colour, opacity);
         if major && let Some(longest) = lines.iter().max_by_key(|line| line.len()) {
-            labels.push((longest[longest.len() / 2], number(isoline.level)));
+            labels.push(label_places(longest, &number(isoline.level), layer.colour, sheet.unit));
         }
     }
-    for (at, label) in labels {
-        let size = 17.0 * sheet.unit;
-        let baseline = at + Vec2::new(-text::width(&label, size) / 2.0, 0.36 * size);
-        sheet.canvas.text(&label, size, baseline, layer.colour, 3.0 * sheet.unit);
+    labels
+}
+
+fn label_places(line: &[Vec2], text: &str, colour: Rgb, unit: f32) -> Vec<Label> {
+    let size = LABEL * unit;
+    let half = Vec2::new(text::width(text, size) / 2.0 + 4.0 * unit, 0.6 * size);
+    [8, 4, 12, 6, 10, 2, 14, 5, 11, 3, 13]
+        .map(|sixteenths| line[line.len() * sixteenths / 16])
+        .map(|middle| Label { middle, half, text: text.to_owned(), colour })
+        .into()
+}
+
+/// Draws each label in its first place that is on the map and free of `taken` points and of other
+/// labels; a label without such a place is left out.
+fn draw_labels(sheet: &mut Sheet, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
+    let size = LABEL * sheet.unit;
+    let mut drawn: Vec<Label> = Vec::new();
+    for places in labels {
+        let free = |l: &Label| {
+            let apart = |p: Vec2, reach: Vec2| (p - l.middle).abs().cmpgt(l.half + reach).any();
+            sheet.shows(l.middle - l.half)
+                && sheet.shows(l.middle + l.half)
+                && taken.iter().all(|&p| apart(p, Vec2::splat(10.0 * sheet.unit)))
+                && drawn.iter().all(|d| apart(d.middle, d.half))
+        };
+        if let Some(label) = places.into_iter().find(free) {
+            let width = text::width(&label.text, size);
+            let baseline = label.middle + Vec2::new(-width / 2.0, 0.36 * size);
+            sheet.canvas.text(&label.text, size, baseline, label.colour, 3.0 * sheet.unit);
+            drawn.push(label);
+        }
     }
 }
 

@@ -83,8 +83,16 @@ impl Sheet {
         let height = head + size.y as f32 + rows * FOOTER_ROW * unit + 1.5 * margin;
         let mut canvas = Canvas::new(width.ceil() as u32, height.ceil() as u32)?;
 
-        let title = text::fitted(title, TITLE * unit, inner);
-        canvas.text(&title, TITLE * unit, Vec2::new(margin, margin + TITLE * unit), Rgb::INK, 0.0);
+        // A long title is set smaller, down to the size of the legend, before it is cut.
+        let shrink = (inner / text::width(title, TITLE)).clamp(TEXT / TITLE * unit, unit);
+        let title = text::fitted(title, TITLE * shrink, inner);
+        canvas.text(
+            &title,
+            TITLE * shrink,
+            Vec2::new(margin, margin + TITLE * unit),
+            Rgb::INK,
+            0.0,
+        );
         let left = margin + (inner - size.x as f32) / 2.0;
         let foot = head + size.y as f32 + 0.5 * margin;
         for (item, place) in items.iter().zip(places) {
@@ -114,6 +122,13 @@ impl Sheet {
     pub(super) fn place(&self, grid: DVec2) -> Vec2 {
         let corner = DVec2::new(self.map[0] as f64, self.map[1] as f64);
         (corner + (grid + 0.5) / self.cells).as_vec2()
+    }
+
+    /// Whether a pixel is on the map.
+    pub(super) fn shows(&self, at: Vec2) -> bool {
+        let [left, top, width, height] = self.map.map(|v| v as f32);
+        let inside = at - Vec2::new(left, top);
+        inside.cmpge(Vec2::ZERO).all() && inside.cmple(Vec2::new(width, height)).all()
     }
 
     /// Polylines of grid coordinates in pixels.
