@@ -5,8 +5,10 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::fit::{Fit, Plan};
-use super::voids::{fill, fit_finite};
+use super::fit::Fit;
+use super::plan::{Plan, cross_validate, fewest_knots, mean_cell};
+use super::residuals::{Residuals, residuals};
+use super::voids::fit_finite;
 use crate::{Control, Error, GridFrame, Result, Terrain};
 
 /// Degree of the B-spline.
@@ -84,17 +86,6 @@ pub struct HeightJet {
     pub zxy: f64,
     /// `∂²z/∂y²`, 1/m.
     pub zyy: f64,
-}
-
-/// How far the surface lies from the heights it was fitted to.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Residuals {
-    /// Root mean square, m.
-    pub rms: f64,
-    /// Largest, m.
-    pub max: f64,
-    /// Where the largest is, in grid coordinates.
-    pub at: DVec2,
 }
 
 /// A smooth surface `z` over the grid of a terrain.
@@ -250,157 +241,6 @@ impl HeightSurface {
 fn ground_jet(per_metre: DVec2, [z, c, r, cc, cr, rr]: [f64; 6]) -> HeightJet {
     let DVec2 { x, y } = per_metre;
     HeightJet { z, zx: c * x, zy: -r * y, zxx: cc * x * x, zxy: -cr * x * y, zyy: rr * y * y }
-}
-
-/// Side in metres of a square as large as a cell in the middle of the grid.
-fn mean_cell(frame: &GridFrame) -> f64 {
-    let DVec2 { x, y } = frame.mid_spacing();
-    (x * y).sqrt()
-}
-
-/// Residuals of a fit over the finite heights.
-fn residuals(frame: &GridFrame, fit: &Fit, heights: &[f64]) -> Residuals {
-    let rows: Vec<(f64, usize, f64, usize)> = heights
-        .par_chunks(frame.cols())
-        .enumerate()
-        .map_init(
-            || vec![0.0; frame.cols()],
-            |values, (row, heights)| {
-                fit.row_values(row, values);
-                let (mut sum, mut count, mut max, mut at) = (0.0, 0, 0.0, 0);
-                for (col, (value, z)) in values.iter().zip(heights).enumerate() {
-                    if z.is_finite() {
-                        let residual = (value - z).abs();
-                        sum += residual * residual;
-                        count += 1;
-                        if residual > max {
-                            (max, at) = (residual, col);
-                        }
-                    }
-                }
-                (sum, count, max, at)
-            },
-        )
-        .collect();
-    // Added row by row, so that the sum does not depend on the number of threads.
-    let (mut sum, mut count) = (0.0, 0);
-    let mut residuals = Residuals::default();
-    for (row, &(squares, valid, max, col)) in rows.iter().enumerate() {
-        sum += squares;
-        count += valid;
-        if max > residuals.max {
-            residuals.max = max;
-            residuals.at = DVec2::new(col as f64, row as f64);
-        }
-    }
-    residuals.rms = (sum / count as f64).sqrt();
-    residuals
-}
-
-/// The plan with the fewest knots whose residuals have a root mean square of at most `rms`, by bisection.
-fn fewest_knots(
-    frame: &GridFrame,
-    heights: &[f64],
-    degree: usize,
-    rms: f64,
-    control: &Control,
-) -> Result<Plan> {
-    let quiet = Control { cancel: control.cancel.clone(), progress: None };
-    let filled = fill(frame, heights, &Plan::every_node(frame, degree), &quiet)?;
-    // Knots at every node interpolate, so the upper end always meets the tolerance.
-    let (mut few, mut enough) = (0, frame.cols().max(frame.rows()) - 1);
-    while few < enough {
-        let middle = few.midpoint(enough);
-        let plan = Plan::coarse(frame, degree, middle);
-        let fit = Fit::new(frame, filled.clone(), &plan, &quiet)?;
-        if residuals(frame, &fit, heights).rms <= rms {
-            enough = middle;
-        } else {
-            few = middle + 1;
-        }
-    }
-    Ok(Plan::coarse(frame, degree, enough))
-}
-
-/// The cut-off in metres with the least generalised cross-validation score (Craven and Wahba, Numer.
-/// Math. 31, 1979)
-///
-/// ```text
-///   GCV = N Σ(s − z)² / (N − tr A)² ,     tr A = tr A_x · tr A_y
-/// ```
-///
-/// where `A = A_y ⊗ A_x` takes heights to fitted heights, a separable fit's trace being the product.
-/// Lengths by powers of two from 2 cells to half the extent, then a golden section around the best.
-fn cross_validate(
-    frame: &GridFrame,
-    heights: &[f64],
-    degree: usize,
-    control: &Control,
-) -> Result<f64> {
-    let quiet = Control { cancel: control.cancel.clone(), progress: None };
-    let (frame, heights) = window(frame, heights)?;
-    let cell = mean_cell(&frame);
-    let filled = fill(&frame, &heights, &Plan::every_node(&frame, degree), &quiet)?;
-    let valid = heights.iter().filter(|z| z.is_finite()).count() as f64;
-    let score = |log_cells: f64| -> Result<f64> {
-        let plan = Plan::smooth(&frame, degree, log_cells.exp2() * cell);
-        let fit = Fit::new(&frame, filled.clone(), &plan, &quiet)?;
-        let [x, y] = (plan.cutoff / frame.mid_spacing()).to_array();
-        let freedom = valid * (1.0 - fit.x.trace(x) * fit.y.trace(y) / frame.nodes() as f64);
-        let gcv = (residuals(&frame, &fit, &heights).rms * valid / freedom).powi(2);
-        Ok(if freedom > 0.0 { gcv } else { f64::INFINITY })
-    };
-    let longest = (frame.cols().max(frame.rows()) as f64 / 2.0).log2().max(2.0) as usize;
-    let mut best = (f64::INFINITY, 1.0);
-    for log_cells in 1..=longest {
-        let gcv = score(log_cells as f64)?;
-        if gcv < best.0 {
-            best = (gcv, log_cells as f64);
-        }
-    }
-    let log_cells = golden_section(best.1 - 1.0, best.1 + 1.0, score)?;
-    Ok(log_cells.exp2() * cell)
-}
-
-/// Where `f` is least between `low` and `high`, to 5 % of their distance.
-fn golden_section(low: f64, high: f64, f: impl Fn(f64) -> Result<f64>) -> Result<f64> {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let (mut low, mut high) = (low, high);
-    let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-    let mut values = [f(inner[0])?, f(inner[1])?];
-    for _ in 0..6 {
-        if values[0] <= values[1] {
-            high = inner[1];
-            inner = [high - GOLDEN * (high - low), inner[0]];
-            values = [f(inner[0])?, values[0]];
-        } else {
-            low = inner[0];
-            inner = [inner[1], low + GOLDEN * (high - low)];
-            values = [values[1], f(inner[1])?];
-        }
-    }
-    Ok((low + high) / 2.0)
-}
-
-/// The part of at most 1024 × 1024 nodes, of nine spread over the grid, with the fewest voids.
-fn window(frame: &GridFrame, heights: &[f64]) -> Result<(GridFrame, Vec<f64>)> {
-    const SIDE: usize = 1024;
-    let (cols, rows) = (frame.cols().min(SIDE), frame.rows().min(SIDE));
-    let voids = |&(col, row): &(usize, usize)| {
-        let lines = heights.chunks(frame.cols()).skip(row).take(rows);
-        lines.flat_map(|line| &line[col..col + cols]).filter(|z| !z.is_finite()).count()
-    };
-    // The middle first: it wins ties.
-    let thirds = |nodes: usize, side: usize| [1, 0, 2].map(|i| i * (nodes - side) / 2);
-    let (col, row) = thirds(frame.rows(), rows)
-        .into_iter()
-        .flat_map(|row| thirds(frame.cols(), cols).map(|col| (col, row)))
-        .min_by_key(voids)
-        .expect("nine places");
-    let corner = frame.to_map(DVec2::new(col as f64, row as f64));
-    let part = GridFrame::new(cols, rows, corner, frame.step(), frame.ground())?;
-    let lines = heights.chunks(frame.cols()).skip(row).take(rows);
-    Ok((part, lines.flat_map(|line| &line[col..col + cols]).copied().collect()))
 }
 
 #[cfg(test)]

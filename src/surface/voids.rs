@@ -9,7 +9,8 @@
 use rayon::prelude::*;
 
 use super::banded::Banded;
-use super::fit::{Axis, Fit, LANES, Plan, stripes};
+use super::fit::{Axis, Fit, LANES, stripes};
+use super::plan::Plan;
 use crate::{Control, GridFrame, Result};
 
 /// Most refits. On waves with noise around a hole (the test of heights beside voids) the largest change of
@@ -53,9 +54,11 @@ pub(super) fn fill(
 ) -> Result<Vec<f64>> {
     let [low, high] = range(heights);
     let mut filled = heights.to_vec();
-    // A node whose row and column are both void is reached in a second pass, over what the first filled.
-    while filled.iter().any(|z| !z.is_finite()) {
-        filled = fill_once(frame, &filled, plan, control)?;
+    // A node whose row and column are both void is reached by the second pass, over what the first filled.
+    for _ in 0..2 {
+        if filled.iter().any(|z| !z.is_finite()) {
+            filled = fill_once(frame, &filled, plan, control)?;
+        }
         for z in &mut filled {
             *z = z.clamp(low - (high - low), high + (high - low));
         }
