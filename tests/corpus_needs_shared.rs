@@ -187,10 +187,9 @@ fn check_place(terrain: &Terrain, entry: &Value) -> Result<(), String> {
 
 fn check_crs(terrain: &Terrain, entry: &Value) -> Result<(), String> {
     let crs = terrain.crs();
-    if let Some(epsg) = entry["epsg"].as_u64() {
-        if crs.epsg().map(u64::from) != Some(epsg) {
-            return Err(format!("EPSG code {:?}, not {epsg}", crs.epsg()));
-        }
+    let epsg = entry["epsg"].as_u64();
+    if epsg.is_some() && crs.epsg().map(u64::from) != epsg {
+        return Err(format!("EPSG code {:?}, not {epsg:?}", crs.epsg()));
     }
     let kind = match crs {
         crs if crs.is_none() => "none",
@@ -207,10 +206,9 @@ fn check_crs(terrain: &Terrain, entry: &Value) -> Result<(), String> {
             return Err(format!("ground {ground:?}, not {unit} m per unit"));
         }
     }
-    if let Some(unit) = entry["z_unit_m"].as_f64() {
-        if (terrain.source().metres_per_height_unit - unit).abs() > 1e-12 {
-            return Err(format!("height unit {}", terrain.source().height_unit));
-        }
+    let unit = entry["z_unit_m"].as_f64().unwrap_or(1.0);
+    if (terrain.source().metres_per_height_unit - unit).abs() > 1e-12 {
+        return Err(format!("height unit {}", terrain.source().height_unit));
     }
     // Places go to longitude and latitude and back, also on the Moon and in CRSs spelled out by their keys.
     if kind != "none" {

@@ -132,25 +132,23 @@ impl Crs {
 
     /// The CRS that the GeoKeys of a GeoTIFF describe.
     pub(super) fn from_geo_keys(keys: GeoKeys) -> Result<Self> {
-        let crs = match (
-            keys.short(key::MODEL_TYPE),
-            keys.short(key::PROJECTED_CRS),
-            keys.short(key::GEOGRAPHIC_CRS),
-        ) {
-            (Some(3), _, _) => {
+        let codes = [key::PROJECTED_CRS, key::GEOGRAPHIC_CRS].map(|k| keys.code(k));
+        let crs = match (keys.short(key::MODEL_TYPE), codes) {
+            (Some(3), _) => {
                 return Err(Error::usage(
                     "the coordinates are geocentric (X, Y, Z), which are no map; reproject with `gdalwarp -t_srs`",
                 ));
             }
-            (_, Some(code), _) if code != USER_DEFINED => {
-                Self::from_epsg(code.into()).or_else(|e| keys.named_crs().ok_or(e))?
+            (_, [Some(code), _]) => Self::from_epsg(code).or_else(|e| keys.named_crs().ok_or(e))?,
+            (Some(2) | None, [None, Some(code)]) => {
+                Self::from_epsg(code).or_else(|e| keys.user_geographic_crs().map_err(|_| e))?
             }
-            (Some(2), None, Some(code)) | (None, None, Some(code)) if code != USER_DEFINED => {
-                Self::from_epsg(code.into())?
-            }
-            (Some(1), _, _) | (_, Some(_), _) => keys.user_projected_crs()?,
-            (Some(2), _, _) => keys.user_geographic_crs()?,
-            _ => Self::none(),
+            (Some(1), _) => keys.user_projected_crs()?,
+            (Some(2), _) => keys.user_geographic_crs()?,
+            _ => match keys.named_crs() {
+                Some(crs) => crs,
+                None => return Ok(Self::none()),
+            },
         };
         Ok(Self { keys: Some(Arc::new(keys.horizontal())), ..crs })
     }
@@ -464,6 +462,11 @@ impl GeoKeys {
         self.find(key).filter(|(location, ..)| *location == 0).map(|(.., value)| value)
     }
 
+    /// A key's EPSG code, if it is one: neither undefined nor user-defined.
+    fn code(&self, key: u16) -> Option<u32> {
+        self.short(key).filter(|code| *code != 0 && *code != USER_DEFINED).map(u32::from)
+    }
+
     fn double(&self, key: u16) -> Option<f64> {
         let (location, _, offset) = self.find(key)?;
         (location == 34736).then(|| self.doubles.get(usize::from(offset)).copied()).flatten()
@@ -510,12 +513,14 @@ impl GeoKeys {
         citations.iter().find_map(|k| self.text(*k)).unwrap_or("unnamed")
     }
 
-    /// A projected CRS with an unknown code but a known unit.
+    /// A CRS of which only the unit is known, and perhaps a code.
     fn named_crs(&self) -> Option<Crs> {
         self.short(key::LINEAR_UNITS)?;
         let metres = self.metres_per_unit().ok()?;
-        let code = self.short(key::PROJECTED_CRS).map(u32::from);
-        Some(Crs { epsg: code, ..Crs::named(self.crs_name(), &unit_name(metres), metres) })
+        Some(Crs {
+            epsg: self.code(key::PROJECTED_CRS),
+            ..Crs::named(self.crs_name(), &unit_name(metres), metres)
+        })
     }
 
     fn user_projected_crs(&self) -> Result<Crs> {

@@ -31,15 +31,20 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
     let keys = geo_keys(image)?;
     let metadata = image.text(tag::GDAL_METADATA)?.unwrap_or_default();
     let unit = match want {
-        Want::Heights => height_unit(keys.as_ref(), &metadata)?,
+        Want::Heights => height_unit(&keys, &metadata)?,
         Want::Bands => None,
     };
-    let crs = match keys {
-        Some(keys) => {
-            Crs::from_geo_keys(keys.clone()).map_err(|e| Fault::Unsupported(e.to_string()))?
-        }
-        None => Crs::none(),
-    };
+    // Tie points give the centre of a cell, not its corner.
+    let point = keys.short(key::RASTER_TYPE) == Some(2);
+    let (origin, step) =
+        placement(image, point)?.or_else(|| world_file(path)).unwrap_or_else(|| {
+            notes.push(
+                "the file is not georeferenced: cells of 1 map unit at the origin are assumed"
+                    .to_owned(),
+            );
+            (DVec2::new(0.5, layout.rows as f64 - 0.5), DVec2::new(1.0, -1.0))
+        });
+    let crs = Crs::from_geo_keys(keys).map_err(|e| Fault::Unsupported(e.to_string()))?;
     if want == Want::Heights {
         if layout.bands > 1 {
             notes.push(format!(
@@ -68,15 +73,6 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
             Ok(values)
         })
         .collect::<Outcome<_>>()?;
-    let point = keys_say_point(image)?;
-    let (origin, step) =
-        placement(image, point)?.or_else(|| world_file(path)).unwrap_or_else(|| {
-            notes.push(
-                "the file is not georeferenced: cells of 1 map unit at the origin are assumed"
-                    .to_owned(),
-            );
-            (DVec2::new(0.5, layout.rows as f64 - 0.5), DVec2::new(1.0, -1.0))
-        });
     let (height_unit, metres_per_height_unit) = unit.unwrap_or(("metre", 1.0));
     Ok(Raster {
         cols: layout.cols,
@@ -137,18 +133,14 @@ fn check_meaning(image: &Directory, layout: &Layout) -> Outcome<()> {
     }
 }
 
-fn geo_keys(image: &Directory) -> Outcome<Option<GeoKeys>> {
-    let Some(directory) = image.uints(tag::GEO_KEY_DIRECTORY)? else { return Ok(None) };
-    Ok(Some(GeoKeys {
+/// The GeoKeys; none at all if the image has no directory of them.
+fn geo_keys(image: &Directory) -> Outcome<GeoKeys> {
+    let directory = image.uints(tag::GEO_KEY_DIRECTORY)?.unwrap_or_default();
+    Ok(GeoKeys {
         directory: directory.into_iter().map(|v| v as u16).collect(),
         doubles: image.doubles(tag::GEO_DOUBLE_PARAMS)?,
         ascii: image.text(tag::GEO_ASCII_PARAMS)?.unwrap_or_default().into_owned(),
-    }))
-}
-
-/// Whether tie points give the centre of a cell (`PixelIsPoint`), not its corner.
-fn keys_say_point(image: &Directory) -> Outcome<bool> {
-    Ok(geo_keys(image)?.and_then(|k| k.short(key::RASTER_TYPE)) == Some(2))
+    })
 }
 
 /// Map coordinates of the centre of the first cell, and the step per column and stored row.
@@ -222,7 +214,7 @@ fn void_nodata(
     }
     super::void_infinite(values);
     for (value, _) in
-        values.iter_mut().zip(mask.unwrap_or_default()).filter(|(_, valid)| !(**valid > 0.0))
+        values.iter_mut().zip(mask.unwrap_or_default()).filter(|(_, valid)| matches!(valid, 0.0))
     {
         *value = f64::NAN;
     }
@@ -236,7 +228,7 @@ fn void_nodata(
     }
 }
 
-/// Validity of each cell from an internal mask of the same size: positive where valid.
+/// Validity of each cell from an internal mask of the same size: 1 where valid.
 fn internal_mask(images: &[Directory], layout: &Layout) -> Outcome<Option<Vec<f64>>> {
     for image in images {
         if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == MASK {
@@ -277,7 +269,7 @@ fn scale(values: &mut [f64], metadata: &str, band: usize) -> Outcome<()> {
 }
 
 /// Name and metres of the unit of the heights: the band's own, else that of the vertical CRS.
-fn height_unit(keys: Option<&GeoKeys>, metadata: &str) -> Outcome<Option<(&'static str, f64)>> {
+fn height_unit(keys: &GeoKeys, metadata: &str) -> Outcome<Option<(&'static str, f64)>> {
     if let Some(text) = metadata_item(metadata, "unittype", 0).filter(|t| !t.is_empty()) {
         return match named_unit(text) {
             Some(unit) => Ok(Some(unit)),
@@ -286,7 +278,6 @@ fn height_unit(keys: Option<&GeoKeys>, metadata: &str) -> Outcome<Option<(&'stat
             )),
         };
     }
-    let Some(keys) = keys else { return Ok(None) };
     if let Some(code) = keys.short(key::VERTICAL_UNITS).filter(|c| *c != 32767) {
         return match length_unit(code) {
             Some(unit) => Ok(Some(unit)),

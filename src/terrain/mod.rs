@@ -256,24 +256,30 @@ impl Raster {
             .map_err(|e| Error::format(path, e.to_string()))
     }
 
-    /// Without a CRS, coordinates that can be nothing but degrees are taken for degrees: as metres they
-    /// would make every slope a wall.
+    /// Without a CRS, coordinates that look like degrees are taken for degrees: as metres they would make
+    /// every slope a wall.
     fn guess_crs(&mut self) {
-        /// Degrees; two kilometres. No metric DEM has cells of 2 cm and lies within 360 m of its origin,
-        /// but somewhere else than at it.
+        /// Degrees; two kilometres.
         const LARGEST_CELL: f64 = 0.02;
-        let far = self.origin + self.step * DVec2::new(self.cols as f64, -(self.rows as f64));
-        let within = |p: DVec2| p.x.abs() <= 360.0 && p.y.abs() <= 90.0;
-        let at_origin = self.origin.abs().min_element() <= 1.0;
-        let degrees = within(self.origin) && within(far) && self.step.max_element() < LARGEST_CELL;
-        self.notes.push(match Crs::from_epsg(4326) {
-            Ok(wgs84) if degrees && !at_origin => {
+        let half = self.step * DVec2::new(self.cols as f64, -(self.rows as f64)) / 2.0;
+        let middle = self.origin + half;
+        let within = (middle.abs() + half.abs()).cmple(DVec2::new(360.0, 90.0)).all();
+        // Scans of models have small cells too, but begin or are centred at the origin.
+        let near_zero =
+            |p: DVec2| p.cmple(1.5 * self.step).all() && p.cmpge(-1.5 * self.step).all();
+        let local = near_zero(middle) || near_zero(middle - half.abs());
+        let degrees = within && !local && self.step.max_element() < LARGEST_CELL;
+        let note = match Crs::from_epsg(4326) {
+            Ok(wgs84) if degrees => {
                 self.crs = wgs84;
-                "the file names no CRS; its coordinates look like degrees and are taken as WGS84 longitude and latitude"
+                "the file names no CRS; its coordinates look like degrees and are taken as WGS84 \
+                 longitude and latitude"
             }
-            _ => "the file names no CRS; map units are taken as metres, and there are no longitudes and latitudes",
-        }
-        .to_owned());
+            _ => {
+                "the file names no CRS; map units are taken as metres, and there is no way to longitude and latitude"
+            }
+        };
+        self.notes.push(note.to_owned());
     }
 }
 
@@ -340,6 +346,19 @@ impl Format {
         if ascii_grid::is_header(&text) {
             return Ok(Self::AsciiGrid);
         }
+        if text.starts_with("<!doctype html") || text.starts_with("<html") {
+            return Err(Error::format(
+                path,
+                "an HTML page, not a DEM: the download went wrong; fetch the file again",
+            ));
+        }
+        if text.starts_with("version https://git-lfs") {
+            return Err(Error::format(
+                path,
+                "a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
+            ));
+        }
+        // From here on a magic number could as well be a pair of heights.
         if extension == "hgt" {
             return Ok(Self::Hgt);
         }
@@ -356,18 +375,6 @@ impl Format {
             } else {
                 Err(Error::unsupported(path, "a zip archive; unpack it first"))
             };
-        }
-        if text.starts_with("<!doctype html") || text.starts_with("<html") {
-            return Err(Error::format(
-                path,
-                "an HTML page, not a DEM: the download went wrong; fetch the file again",
-            ));
-        }
-        if text.starts_with("version https://git-lfs") {
-            return Err(Error::format(
-                path,
-                "a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
-            ));
         }
         if starts(b"\x89PNG") || starts(b"\xff\xd8\xff") || starts(b"P5") {
             return convert("a picture (PNG, JPEG or PGM), not read yet");

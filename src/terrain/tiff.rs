@@ -499,6 +499,9 @@ pub(super) struct Layout<'a> {
     counts: Vec<u64>,
 }
 
+/// Cells that a tile may have though the image has fewer.
+const LARGEST_SPARE_TILE: usize = 1 << 24;
+
 impl<'a> Layout<'a> {
     pub(super) fn new(image: &Directory<'a>) -> Outcome<Self> {
         let size = |tag| -> Outcome<usize> {
@@ -560,6 +563,12 @@ impl<'a> Layout<'a> {
         // At most 2³² samples of 64 bits in 65535 bands: no overflow.
         let interleaved = if planar { 1 } else { bands };
         let row_bytes = (chunk.0 * interleaved * sample.bits()).div_ceil(8);
+        if chunk.0.saturating_mul(chunk.1) > cols.saturating_mul(rows).max(LARGEST_SPARE_TILE) {
+            return damaged(format!(
+                "tiles of {} × {} cells are larger than the image",
+                chunk.0, chunk.1
+            ));
+        }
         let layout = Self {
             tiff: image.tiff,
             cols,
