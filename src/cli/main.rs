@@ -1,2 +1,24 @@
 //! The `ridgeway` command.
-fn main() {}
+
+mod args;
+mod commands;
+mod cover;
+mod output;
+mod places;
+mod plan;
+mod progress;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    match commands::run(&args::Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(report::exit_code(&error))
+        }
+    }
+}

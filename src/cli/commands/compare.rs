@@ -1,0 +1,128 @@
+//! `ridgeway compare`: one pair of places under several metrics.
+
+use std::fs;
+use std::path::Path;
+
+use ridgeway::export::{routes_geojson, write_folder, write_profiles};
+use ridgeway::{Comparison, Control, Error, MetricField, Result, Route};
+use serde_json::{Value, json};
+
+use super::render::map_picture;
+use super::route::{HEADER, measures, profile};
+use crate::args::{CompareArgs, MetricName, RunArgs};
+use crate::output::check_outputs_in;
+use crate::plan::Journey;
+use crate::report::{Report, Table};
+
+const FILES: [&str; 4] = ["routes.geojson", "profile.csv", "summary.json", "map.png"];
+
+pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Result<()> {
+    if let Some(folder) = &args.output {
+        check_outputs_in(folder, &FILES, args.overwrite)?;
+    }
+    let places = (&args.start.start[..], std::slice::from_ref(&args.goal));
+    let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    let [goal] = &journey.goals[..] else {
+        return Err(Error::usage(format!(
+            "--goal {} holds {} points; compare takes one goal",
+            args.goal,
+            journey.goals.len()
+        )));
+    };
+    let fields = metrics(args, &journey)
+        .into_iter()
+        .map(|name| journey.field(name))
+        .collect::<Result<Vec<_>>>()?;
+    let comparison = Comparison::between(&fields, &journey.start, goal.at, control)
+        .or_else(|error| journey.explain(error, &fields))?;
+    let table = table(&fields, &comparison).to_string();
+    let summary = summary(&fields, &comparison, &journey);
+    if let Some(folder) = &args.output {
+        control.check()?;
+        write_folder(folder, args.overwrite, |folder| {
+            write_files(folder, &fields, &comparison, &summary, &journey)
+        })?;
+    }
+    let written = args.output.iter().map(|folder| {
+        let files = FILES.map(|name| folder.join(name).display().to_string());
+        format!("wrote {}\n", files.join(", "))
+    });
+    Report { text: table + EXPLANATION + &written.collect::<String>(), json: summary }.print(run)
+}
+
+const EXPLANATION: &str =
+    "x METRIC: cost under that metric, as a ratio to the best route under it\n";
+
+/// The metrics asked for, each once.
+fn metrics(args: &CompareArgs, journey: &Journey<'_>) -> Vec<MetricName> {
+    let mut names = args.metrics.clone();
+    if names.is_empty() {
+        names = vec![MetricName::Isotropic, MetricName::Curvature, journey.default_metric()];
+    }
+    let mut once = Vec::new();
+    for name in names {
+        if !once.contains(&name) {
+            once.push(name);
+        }
+    }
+    once
+}
+
+fn table(fields: &[MetricField<'_>], comparison: &Comparison) -> Table {
+    let mut table = Table::default();
+    let ratios = fields.iter().map(|field| format!("x {}", field.name()));
+    table.row(HEADER.into_iter().map(String::from).chain(ratios));
+    for (r, (field, route)) in fields.iter().zip(&comparison.routes).enumerate() {
+        let ratios = (0..fields.len()).map(|m| format!("{:.3}", comparison.ratio(m, r)));
+        table.row(measures(field.name(), route).into_iter().chain(ratios));
+    }
+    table
+}
+
+fn summary(fields: &[MetricField<'_>], comparison: &Comparison, journey: &Journey<'_>) -> Value {
+    let routes: Vec<_> = fields
+        .iter()
+        .zip(&comparison.routes)
+        .enumerate()
+        .map(|(r, (field, route))| {
+            let costs: serde_json::Map<_, _> = fields
+                .iter()
+                .enumerate()
+                .map(|(m, under)| {
+                    let cost = json!({
+                        "cost": comparison.costs[m][r],
+                        "unit": under.unit(),
+                        "ratio_to_best": comparison.ratio(m, r),
+                    });
+                    (under.name().to_owned(), cost)
+                })
+                .collect();
+            json!({ "name": field.name(), "summary": route.summary, "costs": costs })
+        })
+        .collect();
+    json!({ "routes": routes, "provenance": journey.provenance() })
+}
+
+fn write_files(
+    folder: &Path,
+    fields: &[MetricField<'_>],
+    comparison: &Comparison,
+    summary: &Value,
+    journey: &Journey<'_>,
+) -> Result<()> {
+    let named: Vec<(&str, &Route)> =
+        fields.iter().map(MetricField::name).zip(&comparison.routes).collect();
+    let profiles: Vec<_> =
+        named.iter().map(|(name, route)| (*name, profile(route, journey))).collect();
+    let mut csv = Vec::new();
+    let write = |name: &str, content: &[u8]| {
+        let path = folder.join(name);
+        fs::write(&path, content).map_err(|source| Error::io(name, source))
+    };
+    write_profiles(&mut csv, &profiles).map_err(|source| Error::io(FILES[1], source))?;
+    let crs = journey.terrain.crs();
+    write(FILES[0], routes_geojson(&named, crs, &journey.provenance())?.as_bytes())?;
+    write(FILES[1], &csv)?;
+    write(FILES[2], format!("{summary:#}\n").as_bytes())?;
+    write(FILES[3], &map_picture(journey, &named, &comparison.distances)?)
+}

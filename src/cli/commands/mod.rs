@@ -1,0 +1,38 @@
+//! The commands, one file each.
+
+mod compare;
+mod distance;
+mod info;
+mod manual;
+mod render;
+mod route;
+mod surface;
+mod synth;
+
+use ridgeway::{Error, Result};
+
+use crate::args::{Cli, Command};
+use crate::progress;
+
+/// Runs what the user asked for.
+pub(crate) fn run(cli: &Cli) -> Result<()> {
+    if let Some(threads) = cli.run.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.into())
+            .build_global()
+            .map_err(|error| Error::usage(format!("--threads {threads}: {error}")))?;
+    }
+    let control = progress::control(&cli.run);
+    let run = &cli.run;
+    match &cli.command {
+        Command::Info(args) => info::run(args, run),
+        Command::Synth(args) => synth::run(args, run),
+        Command::Surface(args) => surface::run(args, run, &control),
+        Command::Distance(args) => distance::run(args, run, &control),
+        Command::Route(args) => route::run(args, run, &control),
+        Command::Compare(args) => compare::run(args, run, &control),
+        Command::Render(args) => render::run(args, run, &control),
+        Command::Completions { shell } => manual::completions(*shell),
+        Command::Man => manual::page(),
+    }
+}

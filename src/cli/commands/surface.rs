@@ -1,0 +1,88 @@
+//! `ridgeway surface`: the fitted surface, its residuals and derivatives.
+
+use ridgeway::{Control, HeightJet, HeightSurface, Result};
+use serde_json::json;
+
+use crate::args::{Layer, RunArgs, SurfaceArgs};
+use crate::output::{check_file, write_raster};
+use crate::plan;
+use crate::report::{Facts, Report, digits, wrote};
+
+pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Result<()> {
+    if let Some(output) = &args.output {
+        check_file(output, &["tif", "tiff"], args.overwrite, Some(&args.dem))?;
+    }
+    let terrain = plan::open(&args.dem, run)?;
+    let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
+    if let Some(output) = &args.output {
+        let bands: Vec<_> = args
+            .layers
+            .iter()
+            .map(|&layer| (layer.description().to_owned(), layer.sample(&surface)))
+            .collect();
+        control.check()?;
+        write_raster(output, args.overwrite, &terrain, &bands)?;
+    }
+    report(args, &surface).print(run)
+}
+
+fn report(args: &SurfaceArgs, surface: &HeightSurface) -> Report {
+    let residuals = surface.residuals();
+    let at = surface.frame().to_map(residuals.at);
+    let fit = plan::describe_fit(&args.fit, surface);
+    let mut facts = Facts::default();
+    facts.add("surface", fit.as_str());
+    facts.add("residuals", format!("{} m root mean square", digits(residuals.rms)));
+    facts.add("largest", format!("{} m at {},{}", digits(residuals.max), at.x, at.y));
+    facts.add("curvature", format!("{} 1/m root mean square", digits(surface.rms_curvature())));
+    Report {
+        text: facts.to_string() + &args.output.iter().map(|path| wrote(path)).collect::<String>(),
+        json: json!({
+            "surface": fit,
+            "cutoff_m": surface.cutoff(),
+            "rms_residual_m": residuals.rms,
+            "max_residual_m": residuals.max,
+            "max_residual_at": at.to_array(),
+            "rms_curvature_per_m": surface.rms_curvature(),
+            "outputs": args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
+        }),
+    }
+}
+
+impl Layer {
+    fn description(self) -> &'static str {
+        match self {
+            Self::Height => "height (m)",
+            Self::Slope => "slope (degrees)",
+            Self::Gaussian => "Gaussian curvature (1/m2)",
+            Self::Mean => "mean curvature (1/m)",
+            Self::K1 => "larger principal curvature (1/m)",
+            Self::K2 => "smaller principal curvature (1/m)",
+        }
+    }
+
+    fn of(self, jet: &HeightJet) -> f64 {
+        match self {
+            Self::Height => jet.z,
+            Self::Slope => jet.slope().to_degrees(),
+            Self::Gaussian => jet.curvature().gaussian,
+            Self::Mean => jet.curvature().mean,
+            Self::K1 => jet.curvature().principal[0],
+            Self::K2 => jet.curvature().principal[1],
+        }
+    }
+
+    /// The layer at all nodes, row-major; `NaN` at voids.
+    pub(super) fn sample(self, surface: &HeightSurface) -> Vec<f32> {
+        let (cols, rows) = (surface.frame().cols(), surface.frame().rows());
+        let mut jets = vec![HeightJet::default(); cols];
+        let mut values = Vec::with_capacity(surface.frame().nodes());
+        for row in 0..rows {
+            surface.row_jets(row, &mut jets);
+            values.extend(jets.iter().enumerate().map(|(col, jet)| {
+                if surface.is_void(col, row) { f32::NAN } else { self.of(jet) as f32 }
+            }));
+        }
+        values
+    }
+}

@@ -1,0 +1,56 @@
+//! `ridgeway synth`: synthetic terrains.
+
+use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::{Crs, Result, Terrain};
+use serde_json::json;
+
+use crate::args::{RunArgs, SynthArgs};
+use crate::output::{check_file, write_raster};
+use crate::report::{Report, Table, wrote};
+
+pub(super) fn run(args: &SynthArgs, run: &RunArgs) -> Result<()> {
+    // The parser asks for both unless --list is given.
+    let (Some(kind), Some(output), false) = (&args.kind, &args.output, args.list) else {
+        return list(run);
+    };
+    let terrain = terrain(args, kind.parse()?)?;
+    check_file(output, &["tif", "tiff"], args.overwrite, None)?;
+    let heights = terrain.heights().iter().map(|&z| z as f32).collect();
+    write_raster(output, args.overwrite, &terrain, &[("height (m)".into(), heights)])?;
+    let frame = terrain.frame();
+    Report {
+        text: wrote(output),
+        json: json!({
+            "kind": kind,
+            "columns": frame.cols(),
+            "rows": frame.rows(),
+            "spacing_m": args.spacing,
+            "seed": args.seed,
+            "crs": terrain.crs().name(),
+            "outputs": [output.display().to_string()],
+        }),
+    }
+    .print(run)
+}
+
+fn terrain(args: &SynthArgs, kind: SyntheticKind) -> Result<Terrain> {
+    let (cols, rows) = args.size;
+    let mut synthetic = Synthetic::new(kind, cols, rows, args.spacing)?.with_seed(args.seed);
+    if let Some(relief) = args.relief {
+        synthetic = synthetic.with_relief(relief)?;
+    }
+    let crs = args.crs.map_or_else(|| Ok(Crs::none()), Crs::from_epsg)?;
+    let metres = crs.ground().metres_per_unit(args.origin.y);
+    let to_centre = synthetic.position(cols - 1, 0) / metres;
+    synthetic.terrain(crs, args.origin + to_centre)
+}
+
+fn list(run: &RunArgs) -> Result<()> {
+    let mut table = Table::default();
+    for kind in SyntheticKind::ALL {
+        table.row([kind.name(), kind.description()]);
+    }
+    let kinds =
+        SyntheticKind::ALL.map(|k| json!({ "name": k.name(), "description": k.description() }));
+    Report { text: table.to_string(), json: json!(kinds) }.print(run)
+}

@@ -1,0 +1,113 @@
+//! Output files, checked before the work starts.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use ridgeway::export::{Band, GeoKeys, Samples, check_free, write_file, write_geotiff};
+use ridgeway::{Error, Result, Terrain};
+
+/// The extension of an output in lower case, which picks its format, after checks that the file can
+/// be written once the work is done.
+///
+/// # Errors
+/// An extension that is not in `known`; the file exists and may not be replaced, or is the input; the
+/// folder is missing or not writable.
+pub(crate) fn check_file(
+    path: &Path,
+    known: &[&str],
+    overwrite: bool,
+    input: Option<&Path>,
+) -> Result<String> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let Some(extension) = extension.filter(|e| known.contains(&e.as_str())) else {
+        let known: Vec<_> = known.iter().map(|e| format!(".{e}")).collect();
+        return Err(Error::usage(format!(
+            "{}: cannot tell the format from the name; end it in {}",
+            path.display(),
+            known.join(", ")
+        )));
+    };
+    if input.is_some_and(|input| same_file(path, input)) {
+        return Err(Error::usage(format!(
+            "{}: is the DEM itself; choose another name for the output",
+            path.display()
+        )));
+    }
+    check_free(path, overwrite)?;
+    check_writable(path)?;
+    Ok(extension)
+}
+
+/// Checks that the folder `path` can be filled with files of these `names`.
+///
+/// # Errors
+/// It is a file; one of the files exists and may not be replaced; the place is missing or not writable.
+pub(crate) fn check_outputs_in(path: &Path, names: &[&str], overwrite: bool) -> Result<()> {
+    if path.is_file() {
+        return Err(Error::usage(format!("{}: is a file; name a folder", path.display())));
+    }
+    if !path.is_dir() {
+        check_free(path, overwrite)?;
+        return check_writable(path);
+    }
+    for name in names {
+        let file = path.join(name);
+        check_free(&file, overwrite)?;
+        check_writable(&file)?;
+    }
+    Ok(())
+}
+
+/// Refuses to name one output twice.
+pub(crate) fn check_distinct(paths: &[&PathBuf]) -> Result<()> {
+    for (i, path) in paths.iter().enumerate() {
+        if paths[..i].contains(path) {
+            return Err(Error::usage(format!("{}: named twice as an output", path.display())));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that a file can be made beside `path`, by making one without a name.
+fn check_writable(path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
+}
+
+/// Writes bands, each with what it holds and its unit, on the grid of the terrain.
+///
+/// # Errors
+/// The disk's.
+pub(crate) fn write_raster(
+    path: &Path,
+    overwrite: bool,
+    terrain: &Terrain,
+    bands: &[(String, Vec<f32>)],
+) -> Result<()> {
+    let crs = terrain.crs();
+    let keys = match (crs.geo_keys(), crs.epsg()) {
+        (Some(keys), _) => keys.clone(),
+        (None, Some(code)) => GeoKeys::from_epsg(code, crs.is_geographic()),
+        (None, None) => GeoKeys::default(),
+    };
+    let bands: Vec<_> = bands
+        .iter()
+        .map(|(description, values)| Band { description, samples: Samples::F32(values) })
+        .collect();
+    write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), &keys, &bands))
+}
+
+/// Writes a text file.
+///
+/// # Errors
+/// The disk's.
+pub(crate) fn write_text(path: &Path, overwrite: bool, text: &str) -> Result<()> {
+    write_file(path, overwrite, |out| out.write_all(text.as_bytes()))
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}

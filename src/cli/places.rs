@@ -1,0 +1,344 @@
+//! Places: how the user writes them, and where they lie on the grid.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use geojson::{GeoJson, Geometry, GeometryValue, Position};
+use glam::DVec2;
+use ridgeway::{Error, GridFrame, Result, StartRegion, Terrain};
+
+use crate::args::pair;
+
+/// A place as the user wrote it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Place {
+    At(Notation, DVec2),
+    File(PathBuf),
+}
+
+/// What two numbers mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Notation {
+    /// Map coordinates of the DEM.
+    Map,
+    /// Longitude and latitude in degrees, WGS84.
+    LonLat,
+    /// Column and row.
+    Pixel,
+}
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if let Some(rest) = text.strip_prefix("lonlat:") {
+            return pair(rest)
+                .map(|at| Self::At(Notation::LonLat, at))
+                .map_err(|_| "expected lonlat:LON,LAT, for example lonlat:1.62,42.57".into());
+        }
+        if let Some(rest) = text.strip_prefix("pixel:") {
+            return pair(rest)
+                .map(|at| Self::At(Notation::Pixel, at))
+                .map_err(|_| "expected pixel:COL,ROW, for example pixel:40,60".into());
+        }
+        if let Ok(at) = pair(text) {
+            return Ok(Self::At(Notation::Map, at));
+        }
+        let path = PathBuf::from(text);
+        let extension = path.extension().map(|e| e.to_ascii_lowercase());
+        if extension.is_some_and(|e| e == "geojson" || e == "json") {
+            return Ok(Self::File(path));
+        }
+        Err("expected X,Y, lonlat:LON,LAT, pixel:COL,ROW or a .geojson file".into())
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::At(notation, at) => write!(f, "{}{},{}", notation.prefix(), at.x, at.y),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+impl Notation {
+    fn prefix(self) -> &'static str {
+        match self {
+            Self::Map => "",
+            Self::LonLat => "lonlat:",
+            Self::Pixel => "pixel:",
+        }
+    }
+
+    /// Grid coordinates of two numbers.
+    fn to_grid(self, at: DVec2, terrain: &Terrain) -> Result<DVec2> {
+        match self {
+            Self::Map => Ok(terrain.frame().to_grid(at)),
+            Self::LonLat => lonlat_to_grid(at, terrain),
+            Self::Pixel => Ok(at),
+        }
+    }
+
+    /// Grid coordinates as the user would write them, to about a hundredth of a cell.
+    fn write(self, grid: DVec2, terrain: &Terrain) -> Result<String> {
+        let frame = terrain.frame();
+        let map = frame.to_map(grid);
+        let (at, cell) = match self {
+            Self::Map => (map, frame.step().min_element()),
+            Self::LonLat => {
+                (terrain.crs().to_lonlat(map)?, frame.mid_spacing().min_element() / 111_000.0)
+            }
+            Self::Pixel => (grid, 1.0),
+        };
+        let decimals = (2.0 - cell.log10()).ceil().clamp(0.0, 12.0) as usize;
+        let number = |v: f64| {
+            let text = format!("{v:.decimals$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        };
+        Ok(format!("{}{},{}", self.prefix(), number(at.x), number(at.y)))
+    }
+}
+
+/// One point on the grid that remembers how the user wrote it.
+#[derive(Clone, Debug)]
+pub(crate) struct Spot {
+    /// The option it was given to.
+    option: &'static str,
+    /// As the user wrote it, such as `pixel:3,4`.
+    pub(crate) name: String,
+    /// Grid coordinates.
+    pub(crate) at: DVec2,
+    notation: Notation,
+}
+
+impl Spot {
+    /// Puts a point on the grid.
+    ///
+    /// # Errors
+    /// It lies outside the DEM: the message names the nearest place inside, and says if x and y look swapped.
+    fn new(
+        option: &'static str,
+        name: String,
+        notation: Notation,
+        at: DVec2,
+        terrain: &Terrain,
+    ) -> Result<Self> {
+        let frame = terrain.frame();
+        let grid = notation.to_grid(at, terrain)?;
+        if frame.covers(grid) {
+            // The surface ends at the outermost nodes, half a cell before the raster does.
+            return Ok(Self { option, name, at: frame.clamp(grid), notation });
+        }
+        let last = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
+        let (low, high) = match notation {
+            Notation::Pixel => (DVec2::ZERO, last),
+            _ => (DVec2::new(0.0, last.y), DVec2::new(last.x, 0.0)),
+        };
+        let mut message = format!(
+            "{option} {name} lies outside the DEM, which reaches from {} to {}",
+            notation.write(low, terrain)?,
+            notation.write(high, terrain)?,
+        );
+        let swapped = DVec2::new(at.y, at.x);
+        if notation.to_grid(swapped, terrain).is_ok_and(|grid| frame.covers(grid)) {
+            let names = match notation {
+                Notation::Map => "x and y",
+                Notation::LonLat => "longitude and latitude",
+                Notation::Pixel => "column and row",
+            };
+            message += &format!("; {names} look swapped: try {}", Place::At(notation, swapped));
+        } else if let Some(near) = nearest(frame, frame.clamp(grid), |c, r| !terrain.is_void(c, r))
+        {
+            message += &format!("; the nearest place on it is {}", notation.write(near, terrain)?);
+        }
+        Err(Error::usage(message))
+    }
+
+    /// # Errors
+    /// Its cell is not good: the message says `why` and names the nearest good place.
+    pub(crate) fn check(
+        &self,
+        terrain: &Terrain,
+        good: impl Fn(usize, usize) -> bool,
+        why: &str,
+    ) -> Result<()> {
+        let (col, row) = cell(self.at);
+        if good(col, row) {
+            return Ok(());
+        }
+        Err(Error::usage(self.refusal(terrain, good, why)?))
+    }
+
+    /// The sentence that refuses this place and names the nearest good one.
+    pub(crate) fn refusal(
+        &self,
+        terrain: &Terrain,
+        good: impl Fn(usize, usize) -> bool,
+        why: &str,
+    ) -> Result<String> {
+        let Self { option, name, .. } = self;
+        Ok(match nearest(terrain.frame(), self.at, good) {
+            Some(near) => {
+                let near = self.notation.write(near, terrain)?;
+                format!("{option} {name} {why}; the nearest good place is {near}")
+            }
+            None => format!("{option} {name} {why}, and so does every other cell"),
+        })
+    }
+}
+
+/// The start region of the places of `option`, and its points by themselves.
+///
+/// # Errors
+/// A point outside the DEM; a file that cannot be read or holds nothing.
+pub(crate) fn region(
+    option: &'static str,
+    places: &[Place],
+    terrain: &Terrain,
+) -> Result<(StartRegion, Vec<Spot>)> {
+    let (mut region, mut spots) = (StartRegion::default(), Vec::new());
+    for place in places {
+        match place {
+            Place::At(notation, at) => {
+                spots.push(Spot::new(option, place.to_string(), *notation, *at, terrain)?);
+            }
+            Place::File(path) => {
+                let shapes = read_shapes(path, terrain)?;
+                for &lonlat in &shapes.points {
+                    spots.push(file_spot(option, path, lonlat, terrain)?);
+                }
+                region.lines.extend(shapes.lines);
+                region.areas.extend(shapes.areas);
+            }
+        }
+    }
+    region.points.extend(spots.iter().map(|spot| spot.at));
+    Ok((region, spots))
+}
+
+/// The points of the places of `option`.
+///
+/// # Errors
+/// As [`region`]; a file with lines or areas.
+pub(crate) fn points(
+    option: &'static str,
+    places: &[Place],
+    terrain: &Terrain,
+) -> Result<Vec<Spot>> {
+    let (region, spots) = region(option, places, terrain)?;
+    if region.lines.is_empty() && region.areas.is_empty() {
+        return Ok(spots);
+    }
+    Err(Error::usage(format!("{option} takes points; its file also holds lines or areas")))
+}
+
+fn file_spot(option: &'static str, path: &Path, grid: DVec2, terrain: &Terrain) -> Result<Spot> {
+    let lonlat = terrain.crs().to_lonlat(terrain.frame().to_map(grid))?;
+    let name = format!("{} (point at {:.6},{:.6})", path.display(), lonlat.x, lonlat.y);
+    Spot::new(option, name, Notation::LonLat, lonlat, terrain)
+}
+
+/// Points, lines and areas of a GeoJSON file (RFC 7946: longitude and latitude) in grid coordinates.
+///
+/// # Errors
+/// The file cannot be read, is not GeoJSON, holds no geometry; the DEM has no CRS.
+pub(crate) fn read_shapes(path: &Path, terrain: &Terrain) -> Result<StartRegion> {
+    let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+    let json: GeoJson =
+        text.parse().map_err(|error| Error::format(path, format!("is not GeoJSON: {error}")))?;
+    let geometries: Vec<Geometry> = match json {
+        GeoJson::Geometry(geometry) => vec![geometry],
+        GeoJson::Feature(feature) => feature.geometry.into_iter().collect(),
+        GeoJson::FeatureCollection(all) => {
+            all.features.into_iter().filter_map(|f| f.geometry).collect()
+        }
+    };
+    let mut shapes = StartRegion::default();
+    for geometry in &geometries {
+        gather(&geometry.value, terrain, &mut shapes)
+            .map_err(|error| Error::format(path, error.to_string()))?;
+    }
+    if shapes == StartRegion::default() {
+        return Err(Error::format(path, "holds no points, lines or areas"));
+    }
+    Ok(shapes)
+}
+
+fn gather(geometry: &GeometryValue, terrain: &Terrain, shapes: &mut StartRegion) -> Result<()> {
+    let point = |at: &Position| match *at.as_slice() {
+        [lon, lat, ..] => lonlat_to_grid(DVec2::new(lon, lat), terrain),
+        _ => Err(Error::usage("a position needs two numbers")),
+    };
+    let line = |points: &Vec<Position>| points.iter().map(point).collect::<Result<Vec<_>>>();
+    let area = |rings: &Vec<Vec<Position>>| rings.iter().map(line).collect::<Result<Vec<_>>>();
+    match geometry {
+        GeometryValue::Point { coordinates } => shapes.points.push(point(coordinates)?),
+        GeometryValue::MultiPoint { coordinates } => shapes.points.extend(line(coordinates)?),
+        GeometryValue::LineString { coordinates } => shapes.lines.push(line(coordinates)?),
+        GeometryValue::MultiLineString { coordinates } => shapes.lines.extend(area(coordinates)?),
+        GeometryValue::Polygon { coordinates } => shapes.areas.push(area(coordinates)?),
+        GeometryValue::MultiPolygon { coordinates } => {
+            for rings in coordinates {
+                shapes.areas.push(area(rings)?);
+            }
+        }
+        GeometryValue::GeometryCollection { geometries } => {
+            for geometry in geometries {
+                gather(&geometry.value, terrain, shapes)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn lonlat_to_grid(lonlat: DVec2, terrain: &Terrain) -> Result<DVec2> {
+    Ok(terrain.frame().to_grid(terrain.crs().from_lonlat(lonlat)?))
+}
+
+/// The cell of a point of the grid's hull.
+pub(crate) fn cell(at: DVec2) -> (usize, usize) {
+    (at.x.round() as usize, at.y.round() as usize)
+}
+
+/// The good node nearest to `at` on the ground.
+fn nearest(frame: &GridFrame, at: DVec2, good: impl Fn(usize, usize) -> bool) -> Option<DVec2> {
+    let spacing = frame.spacing(at.y);
+    let nodes = (0..frame.rows()).flat_map(|row| (0..frame.cols()).map(move |col| (col, row)));
+    nodes
+        .filter(|&(col, row)| good(col, row))
+        .map(|(col, row)| DVec2::new(col as f64, row as f64))
+        .min_by(|a, b| {
+            let square = |node: DVec2| ((node - at) * spacing).length_squared();
+            square(*a).total_cmp(&square(*b))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_parse_and_print_alike() {
+        for text in ["388400,4711200", "-1.5,-2", "lonlat:-71.5,42", "pixel:3,4.5", "a/b.geojson"] {
+            assert_eq!(text.parse::<Place>().unwrap().to_string(), text);
+        }
+        for text in ["", "3", "3,", "lonlat:a.geojson", "pixel:3", "nan,3", "valley.tif"] {
+            assert!(text.parse::<Place>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn nearest_counts_ground_distance() {
+        let frame =
+            GridFrame::new(9, 9, DVec2::ZERO, DVec2::new(10.0, 50.0), ridgeway::Ground::METRES)
+                .unwrap();
+        let good = |col, row| (col, row) == (4, 6) || (col, row) == (8, 4);
+        assert_eq!(nearest(&frame, DVec2::splat(4.0), good), Some(DVec2::new(8.0, 4.0)));
+        assert_eq!(nearest(&frame, DVec2::ZERO, |_, _| false), None);
+    }
+}

@@ -1,0 +1,289 @@
+//! From flags to real things: the terrain, the surface on it, the metrics, and the places.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use ridgeway::terrain::read_bands;
+use ridgeway::{
+    Control, DistanceMap, Error, HeightSurface, Metric, MetricField, Modifiers, Result, Smoothing,
+    Solver, StartRegion, Sym2, Terrain,
+};
+use serde_json::{Value, json};
+
+use crate::args::{FitArgs, GroundArgs, MetricName, RunArgs};
+use crate::cover::cover;
+use crate::places::{self, Place, Spot, cell};
+use crate::report;
+
+/// Everything that lies between a start and its goals, but the metric.
+pub(crate) struct Journey<'a> {
+    args: &'a GroundArgs,
+    control: &'a Control,
+    dem: &'a Path,
+    pub(crate) terrain: Terrain,
+    pub(crate) surface: HeightSurface,
+    pub(crate) start: StartRegion,
+    pub(crate) starts: Vec<Spot>,
+    pub(crate) goals: Vec<Spot>,
+    start_names: Vec<String>,
+    barrier: Option<Arc<[bool]>>,
+    tensors: Option<Arc<[Sym2]>>,
+}
+
+impl<'a> Journey<'a> {
+    /// Reads the DEM and the files named by flags, puts the places on the grid, and fits the surface.
+    ///
+    /// # Errors
+    /// Any input that cannot be read or used; a place outside the DEM, on a void or on a barrier.
+    pub(crate) fn prepare(
+        dem: &'a Path,
+        (start, goal): (&[Place], &[Place]),
+        args: &'a GroundArgs,
+        run: &RunArgs,
+        control: &'a Control,
+    ) -> Result<Self> {
+        let terrain = open(dem, run)?;
+        let barrier = barrier(args, &terrain)?;
+        let (region, starts) = places::region("--start", start, &terrain)?;
+        let goals = places::points("--goal", goal, &terrain)?;
+        check_open(&terrain, barrier.as_deref(), &region, starts.iter().chain(&goals))?;
+        let tensors = match &args.metric.tensor {
+            Some(path) => Some(tensors(path, &terrain)?),
+            None => None,
+        };
+        let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
+        let start_names = start.iter().map(Place::to_string).collect();
+        Ok(Self {
+            args,
+            control,
+            dem,
+            terrain,
+            surface,
+            start: region,
+            starts,
+            goals,
+            start_names,
+            barrier,
+            tensors,
+        })
+    }
+
+    /// The metric that a user who names none wants.
+    pub(crate) fn default_metric(&self) -> MetricName {
+        if self.tensors.is_some() { MetricName::Tensor } else { MetricName::Curvature }
+    }
+
+    /// The metric of this name on the surface.
+    ///
+    /// # Errors
+    /// `tensor` without `--tensor`; a start or goal where the metric lets nobody enter.
+    pub(crate) fn field(&self, name: MetricName) -> Result<MetricField<'_>> {
+        let metric = match (name, &self.tensors) {
+            (MetricName::Isotropic, _) => Metric::Isotropic,
+            (MetricName::Curvature, _) => Metric::Curvature(self.args.metric.delta),
+            (MetricName::Tensor, Some(tensors)) => Metric::Tensor(Arc::clone(tensors)),
+            (MetricName::Tensor, None) => {
+                return Err(Error::usage("the metric `tensor` needs --tensor FILE.tif"));
+            }
+        };
+        let modifiers = Modifiers {
+            climb_weight: self.args.metric.climb_weight,
+            max_slope_deg: self.args.metric.max_slope,
+            barrier: self.barrier.clone(),
+        };
+        let field = metric.on(&self.surface, &modifiers)?;
+        for spot in self.starts.iter().chain(&self.goals) {
+            let why = match self.args.metric.max_slope {
+                Some(_) => "lies on ground steeper than --max-slope allows",
+                None => "lies where --tensor has no value",
+            };
+            spot.check(&self.terrain, |col, row| field.is_open(col, row), why)?;
+        }
+        Ok(field)
+    }
+
+    /// Distance from the start; with `everywhere`, at all cells, else as far as the goals.
+    ///
+    /// # Errors
+    /// [`Error::NoWay`] if a goal cannot be reached: the message names the nearest place that can.
+    pub(crate) fn solve(&self, field: &MetricField<'_>, everywhere: bool) -> Result<DistanceMap> {
+        let goals: Vec<_> = self.goals.iter().map(|goal| goal.at).collect();
+        let stop = if everywhere { &[][..] } else { &goals };
+        let distance = Solver::default().solve(field, &self.start, stop, self.control)?;
+        for goal in &self.goals {
+            if distance.at(goal.at).is_none() {
+                let reached = |col, row| distance.at_node(col, row).is_finite();
+                let why = "cannot be reached from the start: voids or barriers lie between";
+                return Err(Error::NoWay(goal.refusal(&self.terrain, reached, why)?));
+            }
+        }
+        Ok(distance)
+    }
+
+    /// For [`Error::NoWay`], which metrics' distances end before the goal and where; else the error.
+    ///
+    /// # Errors
+    /// Always: the best account there is.
+    pub(crate) fn explain<T>(&self, error: Error, fields: &[MetricField<'_>]) -> Result<T> {
+        if let Error::NoWay(_) = error {
+            for field in fields {
+                self.solve(field, true)?;
+            }
+        }
+        Err(error)
+    }
+
+    /// All that is needed to make the run again, for the files it writes.
+    pub(crate) fn provenance(&self) -> Value {
+        let metric = &self.args.metric;
+        let name =
+            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        json!({
+            "software": format!("ridgeway {}", env!("CARGO_PKG_VERSION")),
+            "command": command_line(),
+            "dem": name(self.dem),
+            "surface": describe_fit(&self.args.fit, &self.surface),
+            "cutoff_m": self.surface.cutoff(),
+            "climb_weight": metric.climb_weight,
+            "max_slope_deg": metric.max_slope,
+            "barriers": metric.barrier.iter().map(|path| name(path)).collect::<Vec<_>>(),
+            "tensor": metric.tensor.as_deref().map(name),
+            "start": self.start_names,
+            "goal": self.goals.iter().map(|goal| &goal.name).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// Reads the DEM and tells what its reader noticed.
+pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
+    let terrain = Terrain::open(dem)?;
+    report::notes(&terrain, run);
+    Ok(terrain)
+}
+
+/// The surface that was fitted, in words.
+pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
+    let options = args.options();
+    let how = match (options.smoothing, surface.cutoff()) {
+        (Smoothing::Interpolate, _) => "through every height".into(),
+        (Smoothing::Tolerance(tolerance), _) => format!("within {tolerance} m (root mean square)"),
+        (Smoothing::Auto, Some(cutoff)) => {
+            format!("cut-off {} by cross-validation", report::metres(cutoff))
+        }
+        (_, Some(cutoff)) => format!("cut-off {}", report::metres(cutoff)),
+        (_, None) => "smoothed".into(),
+    };
+    format!("{:?} B-spline, {how}", options.degree).to_lowercase().replace("b-s", "B-s")
+}
+
+/// The cells of `--barrier`, if there are any.
+fn barrier(args: &GroundArgs, terrain: &Terrain) -> Result<Option<Arc<[bool]>>> {
+    let mut shapes = StartRegion::default();
+    for path in &args.metric.barrier {
+        let more = places::read_shapes(path, terrain)?;
+        shapes.points.extend(more.points);
+        shapes.lines.extend(more.lines);
+        shapes.areas.extend(more.areas);
+    }
+    let any = !args.metric.barrier.is_empty();
+    Ok(any.then(|| cover(terrain.frame(), &shapes).into()))
+}
+
+/// Checks that points are, and that a start of lines and areas touches, neither void nor barrier.
+fn check_open<'s>(
+    terrain: &Terrain,
+    barrier: Option<&[bool]>,
+    region: &StartRegion,
+    spots: impl Iterator<Item = &'s Spot>,
+) -> Result<()> {
+    let closed = |col, row| barrier.is_some_and(|cells| cells[terrain.frame().index(col, row)]);
+    let open = |col, row| !terrain.is_void(col, row) && !closed(col, row);
+    for spot in spots {
+        let (col, row) = cell(spot.at);
+        let why = match terrain.is_void(col, row) {
+            true => "lies on a void of the DEM",
+            false => "lies on a barrier",
+        };
+        spot.check(terrain, open, why)?;
+    }
+    if region.points.is_empty() {
+        let touched = cover(terrain.frame(), region);
+        let cols = terrain.frame().cols();
+        let any = touched.iter().enumerate().any(|(i, &t)| t && open(i % cols, i / cols));
+        if !any {
+            return Err(Error::usage(
+                "--start: its lines and areas touch no open cell of the DEM; the file must be in \
+                 longitude and latitude (RFC 7946) and overlap the DEM",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The speed tensors of a three-band raster on the grid of the terrain.
+fn tensors(path: &Path, terrain: &Terrain) -> Result<Arc<[Sym2]>> {
+    let raster = read_bands(path)?;
+    let [xx, xy, yy] = &raster.bands[..] else {
+        let found = raster.bands.len();
+        return Err(Error::format(
+            path,
+            format!("has {found} bands; a tensor raster has three: D11, D12, D22"),
+        ));
+    };
+    let (theirs, ours) = (&raster.frame, terrain.frame());
+    let apart = (theirs.origin() - ours.origin()).abs().max((theirs.step() - ours.step()).abs());
+    if (theirs.cols(), theirs.rows()) != (ours.cols(), ours.rows())
+        || apart.max_element() > 0.01 * ours.step().min_element()
+    {
+        return Err(Error::format(
+            path,
+            format!(
+                "its grid of {} x {} cells from {},{} is not the DEM's of {} x {} cells from {},{}; \
+                 resample it to the DEM, for example with gdalwarp -te -ts",
+                theirs.cols(),
+                theirs.rows(),
+                theirs.origin().x,
+                theirs.origin().y,
+                ours.cols(),
+                ours.rows(),
+                ours.origin().x,
+                ours.origin().y
+            ),
+        ));
+    }
+    Ok(xx.iter().zip(xy).zip(yy).map(|((&xx, &xy), &yy)| Sym2 { xx, xy, yy }).collect())
+}
+
+/// The command line, quoted for a shell.
+fn command_line() -> String {
+    std::env::args_os()
+        .enumerate()
+        .map(|(i, word)| match i {
+            0 => "ridgeway".into(),
+            _ => quoted(&word.to_string_lossy()),
+        })
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=+./,:%@".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.into()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        assert_eq!(quoted("--start=-3,4"), "--start=-3,4");
+        assert_eq!(quoted("my dem.tif"), "'my dem.tif'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted(""), "''");
+    }
+}
