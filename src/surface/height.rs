@@ -726,6 +726,14 @@ mod tests {
     }
 
     #[test]
+    fn a_tolerance_is_met_on_oblong_cells() {
+        let frame =
+            GridFrame::new(60, 30, DVec2::ZERO, DVec2::new(1.0, 50.0), Ground::METRES).unwrap();
+        let surface = fit(&frame, &noise(1800), Degree::Cubic, Smoothing::Tolerance(1e-6));
+        assert!(surface.residuals().rms <= 1e-6, "{:?}", surface.residuals());
+    }
+
+    #[test]
     fn impossible_wishes_are_refused() {
         let frame = unit_frame(4, 4);
         let fit = |heights: &[f64], smoothing| {

@@ -4,7 +4,7 @@
 //! The first guess continues the data along rows and along columns by one-dimensional fits without
 //! weight in the voids. Refitting with the fitted heights in the voids then leads to the fit without
 //! weight in all of them (the EM algorithm; Dempster, Laird and Rubin 1977): short waves in one or two
-//! rounds, long ones slowly, but those the first guess has right.
+//! rounds, long ones slowly, but those the first guess has about right.
 
 use rayon::prelude::*;
 
@@ -20,7 +20,8 @@ const ROUNDS: usize = 2;
 /// Refitting ends once no void moves by more than this share of the range of heights.
 const SETTLED: f64 = 1e-7;
 
-/// Shortest cut-off of the first guess, in cells: it must see past single noisy heights.
+/// Shortest cut-off of the first guess, in cells: it must see past single noisy heights. Interpolating
+/// SRTM with holes, the error of the curvature beside them is 4.5, 3.4 and 4.4 /km for 2, 4 and 8 cells.
 const SHORTEST_CUTOFF: f64 = 4.0;
 
 /// Cut-offs from the data beyond which a continuation is held to straight lines.
@@ -170,6 +171,9 @@ impl Continuation {
     fn fill(&self, cells: f64, line: &mut [f64], weights: &mut [f64]) {
         let finite: Vec<usize> = (0..line.len()).filter(|&i| line[i].is_finite()).collect();
         let (Some(&first), Some(&last)) = (finite.first(), finite.last()) else { return };
+        if finite.len() == line.len() {
+            return;
+        }
         // Far from data a free spline is a parabola of rounding errors: hold it to straight lines there.
         let reach = (REACH * self.axis.cutoff(cells)).ceil() as usize;
         let mut held = line.to_vec();
