@@ -259,7 +259,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_enum, default_value_t = Picture::Hillshade)]
     pub(crate) layer: Picture,
     /// Length of the longer side in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 1600, value_parser = clap::value_parser!(u32).range(64..=16384))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1600, value_parser = clap::value_parser!(u32).range(100..=8192))]
     pub(crate) width: u32,
     /// Draw routes from here.
     #[arg(long, value_name = "PLACE", requires = "goal", allow_hyphen_values = true)]

@@ -123,7 +123,7 @@ mod tests {
     fn lines_are_joined_by_sides() {
         let lines = vec![line(&[(-9.0, -6.0), (0.0, 0.0), (3.0, 2.0), (300.0, 200.0)])];
         let drawn = picture(5, 4, &StartRegion { lines, ..Default::default() });
-        assert_eq!(drawn, ["##...", ".##..", "..##.", "...##"].map(String::from));
+        assert_eq!(drawn, ["##...", ".##..", "..###", "....#"].map(String::from));
     }
 
     #[test]

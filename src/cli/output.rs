@@ -86,7 +86,11 @@ pub(crate) fn write_raster(
 ) -> Result<()> {
     let crs = terrain.crs();
     let keys = match (crs.geo_keys(), crs.epsg()) {
-        (Some(keys), _) => keys.clone(),
+        (Some(keys), _) => GeoKeys {
+            directory: keys.directory.clone(),
+            doubles: keys.doubles.clone(),
+            ascii: keys.ascii.clone(),
+        },
         (None, Some(code)) => GeoKeys::from_epsg(code, crs.is_geographic()),
         (None, None) => GeoKeys::default(),
     };
@@ -97,12 +101,12 @@ pub(crate) fn write_raster(
     write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), &keys, &bands))
 }
 
-/// Writes a text file.
+/// Writes a file whose content is ready.
 ///
 /// # Errors
 /// The disk's.
-pub(crate) fn write_text(path: &Path, overwrite: bool, text: &str) -> Result<()> {
-    write_file(path, overwrite, |out| out.write_all(text.as_bytes()))
+pub(crate) fn write_content(path: &Path, overwrite: bool, content: &[u8]) -> Result<()> {
+    write_file(path, overwrite, |out| out.write_all(content))
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

@@ -120,6 +120,13 @@ impl<'a> Journey<'a> {
         Ok(distance)
     }
 
+    /// Cells with a height that `field` lets nobody enter, row-major.
+    pub(crate) fn barriers(&self, field: &MetricField<'_>) -> Vec<bool> {
+        let frame = self.terrain.frame();
+        let nodes = (0..frame.rows()).flat_map(|row| (0..frame.cols()).map(move |col| (col, row)));
+        nodes.map(|(c, r)| !field.is_open(c, r) && !self.terrain.is_void(c, r)).collect()
+    }
+
     /// For [`Error::NoWay`], which metrics' distances end before the goal and where; else the error.
     ///
     /// # Errors
@@ -134,11 +141,16 @@ impl<'a> Journey<'a> {
     }
 
     /// All that is needed to make the run again, for the files it writes.
-    pub(crate) fn provenance(&self) -> Value {
+    pub(crate) fn provenance(&self, fields: &[MetricField<'_>]) -> Value {
         let metric = &self.args.metric;
         let name =
             |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let metrics: Vec<_> = fields
+            .iter()
+            .map(|f| json!({ "name": f.name(), "unit": f.unit(), "delta_per_m": f.delta() }))
+            .collect();
         json!({
+            "metrics": metrics,
             "software": format!("ridgeway {}", env!("CARGO_PKG_VERSION")),
             "command": command_line(),
             "dem": name(self.dem),

@@ -50,7 +50,7 @@ fn report(args: &SurfaceArgs, surface: &HeightSurface) -> Report {
 }
 
 impl Layer {
-    fn description(self) -> &'static str {
+    pub(super) fn description(self) -> &'static str {
         match self {
             Self::Height => "height (m)",
             Self::Slope => "slope (degrees)",

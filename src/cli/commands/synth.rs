@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::args::{RunArgs, SynthArgs};
 use crate::output::{check_file, write_raster};
-use crate::report::{Report, Table, wrote};
+use crate::report::{Facts, Report, wrote};
 
 pub(super) fn run(args: &SynthArgs, run: &RunArgs) -> Result<()> {
     // The parser asks for both unless --list is given.
@@ -46,11 +46,11 @@ fn terrain(args: &SynthArgs, kind: SyntheticKind) -> Result<Terrain> {
 }
 
 fn list(run: &RunArgs) -> Result<()> {
-    let mut table = Table::default();
+    let mut facts = Facts::default();
     for kind in SyntheticKind::ALL {
-        table.row([kind.name(), kind.description()]);
+        facts.add(kind.name(), kind.description());
     }
     let kinds =
         SyntheticKind::ALL.map(|k| json!({ "name": k.name(), "description": k.description() }));
-    Report { text: table.to_string(), json: json!(kinds) }.print(run)
+    Report { text: facts.to_string(), json: json!(kinds) }.print(run)
 }
