@@ -67,8 +67,7 @@ impl Ground {
                 // metre is N cosφ/a ground metres eastward and M cosφ/a northward.
                 const A: f64 = 6_378_137.0;
                 let latitude = (y / A).sinh().atan();
-                Self::WGS84.metres_per_unit(latitude.to_degrees())
-                    * DVec2::new(1.0, latitude.cos())
+                Self::WGS84.metres_per_unit(latitude.to_degrees()) * DVec2::new(1.0, latitude.cos())
                     / (A * 1f64.to_radians())
             }
         }

@@ -4,8 +4,8 @@
 #![allow(unused, clippy::todo, reason = "skeleton")]
 
 mod control;
-mod error;
 pub mod eikonal;
+mod error;
 pub mod export;
 mod grid;
 pub mod metric;
@@ -17,8 +17,8 @@ pub mod terrain;
 pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{DistanceMap, Solver, StartRegion};
 pub use error::{Error, Result};
-pub use grid::{Ground, GridFrame};
-pub use metric::{Delta, Metric, MetricField};
+pub use grid::{GridFrame, Ground};
+pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
 pub use route::{Comparison, Route};
 pub use surface::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
 pub use terrain::{Crs, Terrain};

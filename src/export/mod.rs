@@ -1,1 +1,18 @@
-//! Routes and rasters for other programs.
+//! Routes, isolines and rasters for other programs.
+//!
+//! Nothing here decides where a file goes: the functions make content, [`write_file`] and
+//! [`write_folder`] put it in place whole or not at all.
+
+mod atomic;
+mod geojson;
+mod geotiff;
+mod gpx;
+mod isolines;
+mod profile;
+
+pub use self::atomic::{check_folder_free, check_free, write_file, write_folder};
+pub use self::geojson::{isolines_geojson, routes_geojson};
+pub use self::geotiff::{Band, GeoKeys, Samples, write_geotiff};
+pub use self::gpx::routes_gpx;
+pub use self::isolines::{Isoline, isolines, levels_by_step, round_step};
+pub use self::profile::write_profiles;

@@ -1,25 +1,76 @@
 //! Who travels, and how fast in each direction.
+//!
+//! A metric gives at every point a symmetric positive definite *speed tensor* `D`, in ground axes
+//! (x east, y north, metres). Its dual `M = D⁻¹` measures: a small step `v` costs `√(vᵀ M v)`. Large `D` =
+//! fast = short. Eigenvalues of `D` are squared speeds.
+//!
+//! | metric | `D` | unit of the distance |
+//! |---|---|---|
+//! | [`Metric::Isotropic`] | `G⁻¹`, the inverse first fundamental form | m |
+//! | [`Metric::Curvature`] | `Σ 1/(δ+\|κ_i\|) w_i w_iᵀ` (Seong, Jeong, Cohen 2008, equation 4) | AG units, `m·√(1/m)` |
+//! | [`Metric::Tensor`] | the user's | units of the tensor |
+//!
+//! On the curvature metric a step along a direction of high normal curvature is dear, so routes turn
+//! away from changing slopes and follow valleys, ridges and hillsides.
 
+mod curvature;
 mod sym2;
 
+use std::sync::Arc;
+
 use glam::DVec2;
+use rayon::prelude::*;
 
 pub use self::sym2::Sym2;
-use crate::{Control, GridFrame, HeightSurface, Result};
+use crate::{Error, HeightJet, HeightSurface, Result};
 
-/// The offset `δ` of the curvature tensor, 1/m: how much a flat direction costs beside a curved one.
+/// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Delta {
-    /// This share of the root-mean-square curvature of the surface, so that scaling a terrain changes no route.
+    /// This share of the root-mean-square curvature of the surface. Scaling a terrain then scales `D` by a
+    /// constant and changes no route. On a plane, which has no curvature, `1/extent` instead: any `δ`
+    /// gives the same routes there.
     Auto(f64),
     /// An absolute curvature in 1/m.
     Absolute(f64),
 }
 
+impl Delta {
+    /// Default share of the root-mean-square curvature.
+    pub const DEFAULT_SHARE: f64 = 0.1;
+
+    fn resolve(self, surface: &HeightSurface) -> Result<f64> {
+        let check = |value: f64, what: &str| {
+            if value.is_finite() && value > 0.0 {
+                Ok(value)
+            } else {
+                Err(Error::usage(format!("{what} is {value}; it must be positive and finite")))
+            }
+        };
+        match self {
+            Self::Absolute(delta) => check(delta, "delta"),
+            Self::Auto(share) => {
+                let share = check(share, "the share of the curvature that delta is to be")?;
+                let extent = extent(surface);
+                // Curvature below this is rounding: the sagitta over the whole extent is under 1e-9 of it.
+                let flat = 1e-8 / extent;
+                let rms = surface.rms_curvature();
+                Ok(if rms > flat { share * rms } else { extent.recip() })
+            }
+        }
+    }
+}
+
 impl Default for Delta {
     fn default() -> Self {
-        Self::Auto(0.1)
+        Self::Auto(Self::DEFAULT_SHARE)
     }
+}
+
+/// Length of the grid's diagonal, m.
+fn extent(surface: &HeightSurface) -> f64 {
+    let frame = surface.frame();
+    (frame.mid_spacing() * DVec2::new(frame.cols() as f64, frame.rows() as f64)).length()
 }
 
 /// A way of measuring distance on a surface.
@@ -30,35 +81,136 @@ pub enum Metric {
     Isotropic,
     /// The curvature tensor CT: `D = Σ 1/(δ+|κ_i|) w_i w_iᵀ`.
     Curvature(Delta),
-    /// The user's own speed tensors `D` on the nodes of the terrain.
-    Tensor(std::sync::Arc<Vec<Sym2>>),
+    /// The user's own speed tensors `D` at the nodes, row-major from the north-west, in ground axes
+    /// (x east, y north). A node whose tensor is not finite is a barrier. Between nodes `D` is bilinear.
+    Tensor(Arc<[Sym2]>),
 }
 
-/// Things that compose with every metric.
+/// What composes with every metric.
 #[derive(Clone, Debug, Default)]
 pub struct Modifiers {
-    /// `β`: adds `β ∇z ∇zᵀ` to the metric `M`, an aversion to grade in units of the metric. Default 0.
+    /// `β ≥ 0`: adds `β ∇z ∇zᵀ` to the metric `M`, an aversion to grade: a metre of rise over a plan metre
+    /// costs as much as `√β` flat units more. Default 0.
     pub climb_weight: f64,
-    /// Steepest slope that may be entered, in degrees. Default: any.
+    /// Steepest ground that may be entered, degrees. Default: any.
     pub max_slope_deg: Option<f64>,
-    /// Nodes that may not be entered, row-major; empty for none.
-    pub barrier: std::sync::Arc<Vec<bool>>,
+    /// Nodes that may not be entered, row-major from the north-west. Default: none.
+    pub barrier: Option<Arc<[bool]>>,
 }
 
-/// A metric on a surface: the speed tensor `D` and its dual `M = D⁻¹` at every point.
+/// A metric bound to a surface: the speed tensor `D` everywhere, and where one may go.
 #[derive(Clone, Debug)]
 pub struct MetricField<'a> {
     surface: &'a HeightSurface,
+    speed: Speed,
+    climb_weight: f64,
+    open: Vec<bool>,
+}
+
+#[derive(Clone, Debug)]
+enum Speed {
+    Isotropic,
+    Curvature { delta: f64 },
+    Tensor(Arc<[Sym2]>),
 }
 
 impl Metric {
-    /// Binds the metric to a surface.
+    /// Binds the metric to a surface. Voids of the surface are barriers.
     ///
     /// # Errors
-    /// A `δ` that is not positive and finite, a raster of another size.
-    pub fn on<'a>(&self, surface: &'a HeightSurface, modifiers: &Modifiers) -> Result<MetricField<'a>> {
-        todo!()
+    /// A `δ`, climb weight or slope out of range; a raster whose size is not the surface's; a tensor that
+    /// is finite but not positive definite.
+    pub fn on<'a>(
+        &self,
+        surface: &'a HeightSurface,
+        modifiers: &Modifiers,
+    ) -> Result<MetricField<'a>> {
+        let speed = match self {
+            Self::Isotropic => Speed::Isotropic,
+            Self::Curvature(delta) => Speed::Curvature { delta: delta.resolve(surface)? },
+            Self::Tensor(tensors) => {
+                check_tensors(surface, tensors)?;
+                Speed::Tensor(Arc::clone(tensors))
+            }
+        };
+        let climb_weight = modifiers.climb_weight;
+        if !(climb_weight.is_finite() && climb_weight >= 0.0) {
+            return Err(Error::usage(format!(
+                "the climb weight is {climb_weight}; it must be 0 or more"
+            )));
+        }
+        let open = open_nodes(surface, &speed, modifiers)?;
+        Ok(MetricField { surface, speed, climb_weight, open })
     }
+}
+
+fn check_tensors(surface: &HeightSurface, tensors: &[Sym2]) -> Result<()> {
+    let frame = surface.frame();
+    if tensors.len() != frame.nodes() {
+        return Err(Error::usage(format!(
+            "the tensor raster has {} cells, the terrain {} columns × {} rows; they must cover the same grid",
+            tensors.len(),
+            frame.cols(),
+            frame.rows()
+        )));
+    }
+    let finite = |d: &Sym2| d.xx.is_finite() && d.xy.is_finite() && d.yy.is_finite();
+    match tensors.iter().position(|d| finite(d) && !d.is_positive_definite()) {
+        None => Ok(()),
+        Some(i) => {
+            let d = tensors[i];
+            Err(Error::usage(format!(
+                "the tensor D = [{} {}; {} {}] at column {}, row {} is not positive definite; every speed \
+                 tensor needs D11 > 0 and D11·D22 > D12² (use NaN for barriers)",
+                d.xx,
+                d.xy,
+                d.xy,
+                d.yy,
+                i % frame.cols(),
+                i / frame.cols()
+            )))
+        }
+    }
+}
+
+fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> Result<Vec<bool>> {
+    let frame = surface.frame();
+    let barrier = modifiers.barrier.as_deref();
+    if let Some(barrier) = barrier
+        && barrier.len() != frame.nodes()
+    {
+        return Err(Error::usage(format!(
+            "the barrier has {} cells, the terrain {}",
+            barrier.len(),
+            frame.nodes()
+        )));
+    }
+    let steepest = match modifiers.max_slope_deg {
+        Some(degrees) if degrees > 0.0 && degrees <= 90.0 => Some(degrees.to_radians().tan()),
+        Some(degrees) => {
+            return Err(Error::usage(format!(
+                "the steepest slope is {degrees}°; it must lie between 0 and 90"
+            )));
+        }
+        None => None,
+    };
+    let mut open = vec![true; frame.nodes()];
+    open.par_chunks_mut(frame.cols()).enumerate().for_each(|(row, open)| {
+        let too_steep = |jet: &HeightJet, limit: f64| jet.zx.hypot(jet.zy) > limit;
+        let jets = steepest.map(|limit| {
+            let mut jets = vec![HeightJet::default(); frame.cols()];
+            surface.row_jets(row, &mut jets);
+            (jets, limit)
+        });
+        for (col, open) in open.iter_mut().enumerate() {
+            let i = frame.index(col, row);
+            *open = !surface.is_void(col, row)
+                && !barrier.is_some_and(|b| b[i])
+                && !jets.as_ref().is_some_and(|(jets, limit)| too_steep(&jets[col], *limit))
+                && !matches!(speed, Speed::Tensor(d) if !d[i].is_positive_definite());
+        }
+    });
+    Ok(open)
 }
 
 impl<'a> MetricField<'a> {
@@ -70,37 +222,108 @@ impl<'a> MetricField<'a> {
 
     /// `isotropic`, `curvature` or `tensor`.
     #[must_use]
-    pub fn name(&self) -> &str {
-        todo!()
+    pub fn name(&self) -> &'static str {
+        match self.speed {
+            Speed::Isotropic => "isotropic",
+            Speed::Curvature { .. } => "curvature",
+            Speed::Tensor(_) => "tensor",
+        }
     }
 
-    /// Unit of the distance: `m` for isotropic, `AG units` otherwise.
+    /// Unit of the distance: `m` for isotropic without climb weight, `AG units` (anisotropic geodesic)
+    /// otherwise. For the curvature metric an AG unit is `m·√(1/m)`.
     #[must_use]
     pub fn unit(&self) -> &'static str {
-        todo!()
+        match self.speed {
+            Speed::Isotropic if self.climb_weight == 0.0 => "m",
+            _ => "AG units",
+        }
     }
 
     /// `δ` in 1/m, for the curvature tensor.
     #[must_use]
     pub fn delta(&self) -> Option<f64> {
-        todo!()
+        match self.speed {
+            Speed::Curvature { delta } => Some(delta),
+            _ => None,
+        }
     }
 
-    /// Speed tensor `D` in ground axes at grid coordinates `at`.
-    #[must_use]
-    pub fn speed(&self, at: DVec2) -> Sym2 {
-        todo!()
-    }
-
-    /// Whether the node may be entered.
+    /// Whether the node may be entered: no void, no barrier, not too steep.
     #[must_use]
     pub fn is_open(&self, col: usize, row: usize) -> bool {
-        todo!()
+        self.open[self.surface.frame().index(col, row)]
     }
 
-    /// Length under this metric of a polyline in grid coordinates.
+    /// Speed tensor `D` in ground axes (x east, y north, metres) at grid coordinates `at`, from the spline's exact
+    /// derivatives there. Where closed, that of the continued surface.
+    #[must_use]
+    pub fn speed(&self, at: DVec2) -> Sym2 {
+        self.speed_of(&self.surface.jet(at), |tensors| self.bilinear(tensors, at))
+    }
+
+    /// Speed tensors at all nodes of a row.
+    pub(crate) fn row_speeds(&self, row: usize, jets: &mut [HeightJet], out: &mut [Sym2]) {
+        self.surface.row_jets(row, jets);
+        let start = self.surface.frame().index(0, row);
+        for (col, (jet, out)) in jets.iter().zip(out).enumerate() {
+            *out = self.speed_of(jet, |tensors| tensors[start + col]);
+        }
+    }
+
+    fn speed_of(&self, jet: &HeightJet, tensor: impl Fn(&[Sym2]) -> Sym2) -> Sym2 {
+        let d = match &self.speed {
+            Speed::Isotropic => curvature::isotropic(jet),
+            Speed::Curvature { delta } => curvature::curvature(jet, *delta),
+            Speed::Tensor(tensors) => tensor(tensors),
+        };
+        if self.climb_weight == 0.0 {
+            return d;
+        }
+        let grade = Sym2::outer(DVec2::new(jet.zx, jet.zy));
+        (d.inverse() + grade * self.climb_weight).inverse()
+    }
+
+    fn bilinear(&self, tensors: &[Sym2], at: DVec2) -> Sym2 {
+        let frame = self.surface.frame();
+        let at = frame.clamp(at);
+        let (col, row) = (at.x as usize, at.y as usize);
+        let (east, south) = ((col + 1).min(frame.cols() - 1), (row + 1).min(frame.rows() - 1));
+        let (u, v) = (at.x - col as f64, at.y - row as f64);
+        let d = |col, row| tensors[frame.index(col, row)];
+        [
+            (d(col, row), (1.0 - u) * (1.0 - v)),
+            (d(east, row), u * (1.0 - v)),
+            (d(col, south), (1.0 - u) * v),
+            (d(east, south), u * v),
+        ]
+        .into_iter()
+        .filter(|(d, weight)| *weight > 0.0 && d.is_positive_definite())
+        .fold(Sym2::default(), |sum, (d, weight)| sum + d * weight)
+    }
+
+    /// Cost under this metric of a step `by` (grid coordinates) around grid coordinates `at`: `√(vᵀ M v)`.
+    #[must_use]
+    pub fn step_cost(&self, at: DVec2, by: DVec2) -> f64 {
+        let v = self.surface.frame().ground_vector(at.y, by);
+        self.speed(at).inverse().norm(v)
+    }
+
+    /// Length under this metric of a polyline in grid coordinates: `∫ √(vᵀ M v)` by the midpoint rule on pieces
+    /// of at most half a cell.
     #[must_use]
     pub fn length(&self, line: &[DVec2]) -> f64 {
-        todo!()
+        line.windows(2)
+            .map(|ends| {
+                let by = ends[1] - ends[0];
+                let pieces = (2.0 * by.length()).ceil().max(1.0);
+                (0..pieces as usize)
+                    .map(|i| {
+                        let middle = ends[0] + by * ((i as f64 + 0.5) / pieces);
+                        self.step_cost(middle, by / pieces)
+                    })
+                    .sum::<f64>()
+            })
+            .sum()
     }
 }

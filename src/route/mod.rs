@@ -1,97 +1,56 @@
-//! Distances become polylines.
+//! Distances become routes: polylines from the start region to a goal, with their numbers.
+//!
+//! [`trace`] follows the distance down from the goal (`descent.rs`); [`Summary`] and [`ProfilePoint`] measure the line on
+//! the smooth surface (`profile.rs`); [`Comparison`] sets the routes of several metrics side by side.
+
+mod compare;
+mod descent;
+mod profile;
 
 use glam::{DVec2, DVec3};
-use serde::Serialize;
 
-use crate::{Control, DistanceMap, GridFrame, HeightSurface, MetricField, Result};
+pub use self::compare::Comparison;
+pub use self::profile::{ProfilePoint, Summary};
+use crate::{DistanceMap, Error, MetricField, Result};
 
-/// A route over a surface, from the start region to the goal.
+/// A route over a surface, from the start region to a goal.
 #[derive(Clone, Debug)]
 pub struct Route {
     /// Points in grid coordinates (column, row), from start to goal.
     pub grid: Vec<DVec2>,
-    /// The same points as map coordinates and height in metres.
+    /// The same points as map coordinates and height of the surface in metres.
     pub points: Vec<DVec3>,
     /// The numbers of the route.
     pub summary: Summary,
 }
 
-/// The numbers of a route. Lengths and heights in metres, grades in percent (rise per plan length).
-#[derive(Clone, Debug, Serialize)]
-pub struct Summary {
-    /// Name of the metric.
-    pub metric: String,
-    /// `δ` of the curvature tensor, 1/m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub delta_per_m: Option<f64>,
-    /// Cost under the route's own metric.
-    pub cost: f64,
-    /// Unit of the cost: `m` or `AG units`.
-    pub cost_unit: String,
-    /// Length on the surface, m.
-    pub length_m: f64,
-    /// Length on the map, m.
-    pub plan_length_m: f64,
-    /// Sum of rises, m.
-    pub climb_m: f64,
-    /// Sum of falls, m.
-    pub descent_m: f64,
-    /// Steepest grade along the route, %.
-    pub max_grade_percent: f64,
-    /// Mean of the absolute grade, %.
-    pub mean_grade_percent: f64,
-    /// Steepest slope of the ground across the route, degrees.
-    pub max_side_slope_deg: f64,
-    /// `∫|κ_n| ds`: total normal curvature along the route, radians.
-    pub total_normal_curvature_rad: f64,
-    /// Start in map coordinates.
-    pub start: [f64; 2],
-    /// Goal in map coordinates.
-    pub goal: [f64; 2],
-    /// Version of this crate.
-    pub software: String,
-}
-
-/// One sample of a route's profile.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct ProfilePoint {
-    /// Length on the surface from the start, m.
-    pub distance_m: f64,
-    /// Map coordinates.
-    pub x: f64,
-    /// Map coordinates.
-    pub y: f64,
-    /// Height, m.
-    pub height_m: f64,
-    /// Grade along the route, %.
-    pub grade_percent: f64,
-    /// Slope of the ground across the route, degrees.
-    pub side_slope_deg: f64,
-    /// Normal curvature along the route, 1/m; positive where the ground is hollow.
-    pub normal_curvature_per_m: f64,
-}
-
-/// Traces the route from the start region to `goal` (grid coordinates).
+/// Traces the route from the start region of `distance` to `goal` (grid coordinates). `metric` is the one the
+/// distance was solved with.
+///
+/// The line begins exactly on the start region, ends exactly at the goal, has a point at least every cell or so,
+/// and the distance rises along it from point to point.
 ///
 /// # Errors
-/// [`Error::NoWay`](crate::Error::NoWay) if the goal was not reached.
+/// [`Error::NoWay`] if the front did not reach the goal.
 pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> Result<Route> {
-    todo!()
+    let grid = descent::line(distance, goal).ok_or_else(|| {
+        let at = metric.surface().frame().to_map(goal);
+        Error::NoWay(format!(
+            "there is no way from the start to the goal at {}, {}: voids or barriers lie between",
+            at.x, at.y
+        ))
+    })?;
+    Ok(Route::from_line(grid, metric))
 }
 
 impl Route {
-    /// Samples at equal steps of at most `step` metres along the surface, both ends included.
+    /// A route along a given line in grid coordinates, measured under `metric`.
     #[must_use]
-    pub fn profile(&self, surface: &HeightSurface, step: f64) -> Vec<ProfilePoint> {
-        todo!()
+    pub fn from_line(grid: Vec<DVec2>, metric: &MetricField<'_>) -> Self {
+        let surface = metric.surface();
+        let points =
+            grid.iter().map(|&at| surface.frame().to_map(at).extend(surface.height(at))).collect();
+        let summary = Summary::measure(&grid, metric);
+        Self { grid, points, summary }
     }
-}
-
-/// The routes of several metrics between the same places, and each one's cost under each metric.
-#[derive(Clone, Debug)]
-pub struct Comparison {
-    /// One route per metric.
-    pub routes: Vec<Route>,
-    /// `cost[m][r]`: cost of route `r` under metric `m`.
-    pub cost: Vec<Vec<f64>>,
 }

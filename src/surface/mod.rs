@@ -1,5 +1,19 @@
 //! Heights become a smooth map with exact derivatives.
+//!
+//! [`HeightSurface`] fits a tensor-product B-spline to the heights of a terrain. `basis` has the splines of
+//! one axis, `banded` the solver, `fit` the least squares along rows and then columns, `voids` the heights
+//! that have no weight, `plan` the choice of knots and smoothing; `curvature` says what the derivatives
+//! tell of the shape.
 
+mod banded;
+mod basis;
+mod curvature;
+mod fit;
 mod height;
+mod plan;
+mod residuals;
+mod voids;
 
-pub use self::height::{Degree, FitOptions, HeightJet, HeightSurface, Residuals, Smoothing};
+pub use self::curvature::Curvature;
+pub use self::height::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
+pub use self::residuals::Residuals;

@@ -1,73 +1,759 @@
 //! Coordinate reference systems: which one a file is in, and the way to longitude and latitude.
+//!
+//! Projections are those of [`proj4rs`], definitions those of [`crs_definitions`] (the EPSG data set in PROJ.4
+//! notation). Datum shifts are three- or seven-parameter ones; grid files are not at hand, and where that
+//! matters [`Crs::caveat`] says how much.
+
+use std::sync::{Arc, LazyLock};
 
 use glam::DVec2;
+use proj4rs::Proj;
+use proj4rs::adaptors::transform_xy;
 
-use crate::{Ground, Result};
+use crate::{Error, Ground, Result};
 
 /// The coordinate reference system of a terrain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crs {
-    // private
+    epsg: Option<u32>,
+    name: String,
+    unit: String,
+    ground: Ground,
+    projection: Option<Arc<Projection>>,
+    caveat: Option<String>,
+    keys: Option<Arc<GeoKeys>>,
 }
+
+/// The GeoKey directory of a GeoTIFF and the values it points to (OGC 19-008r4, section 7.1).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GeoKeys {
+    /// Tag 34735: version, revision, minor revision, number of keys; then four numbers a key.
+    pub directory: Vec<u16>,
+    /// Tag 34736.
+    pub doubles: Vec<f64>,
+    /// Tag 34737, without the final NUL.
+    pub ascii: String,
+}
+
+/// A projection and the PROJ.4 text it was made from.
+struct Projection {
+    definition: String,
+    proj: Proj,
+}
+
+impl PartialEq for Projection {
+    fn eq(&self, other: &Self) -> bool {
+        self.definition == other.definition
+    }
+}
+
+impl std::fmt::Debug for Projection {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.definition.fmt(f)
+    }
+}
+
+static WGS84: LazyLock<Proj> = LazyLock::new(|| {
+    Proj::from_proj_string("+proj=longlat +datum=WGS84").expect("a constant that proj4rs reads")
+});
 
 impl Crs {
     /// No CRS: map coordinates in metres on a plane, place unknown.
     #[must_use]
     pub fn none() -> Self {
-        todo!()
+        Self::named("none", "metre", 1.0)
+    }
+
+    /// A projected CRS of which only the name and the unit are known.
+    fn named(name: &str, unit: &str, metres_per_unit: f64) -> Self {
+        Self {
+            epsg: None,
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            ground: Ground::Plane { metres_per_unit },
+            projection: None,
+            caveat: None,
+            keys: None,
+        }
     }
 
     /// The CRS of an EPSG code.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for an unknown code or a unit other than metre, foot and degree.
+    /// [`Error::Usage`] for an unknown code or one whose coordinates are neither lengths nor degrees.
     pub fn from_epsg(code: u32) -> Result<Self> {
-        todo!()
+        // Numbers that Web Mercator went by before it had its own.
+        let code = if matches!(code, 900_913 | 102_100 | 102_113) { 3857 } else { code };
+        let definition =
+            u16::try_from(code).ok().and_then(crs_definitions::from_code).ok_or_else(|| {
+                Error::usage(format!(
+                    "EPSG:{code} is not a known code of a horizontal CRS; reproject with \
+                 `gdalwarp -t_srs EPSG:...` to one that is, such as the UTM zone"
+                ))
+            })?;
+        let mut crs = Self::from_proj(definition.proj4, wkt_name(definition.wkt))?;
+        crs.epsg = Some(code);
+        if let Some((unit, size)) = wkt_unit(definition.wkt) {
+            if crs.is_geographic() && (size - 1f64.to_radians()).abs() > 1e-9 {
+                return Err(Error::usage(format!(
+                    "EPSG:{code} counts angles in {unit}, not degrees; reproject with `gdalwarp -t_srs EPSG:4326`"
+                )));
+            }
+            crs.unit = unit.to_owned();
+        }
+        if code == 3857 {
+            crs.ground = Ground::WebMercator;
+        }
+        Ok(crs)
+    }
+
+    /// The CRS of a PROJ.4 text.
+    fn from_proj(definition: &str, name: &str) -> Result<Self> {
+        let (definition, caveat) = without_shift_grids(definition);
+        let proj = Proj::from_proj_string(&definition)
+            .map_err(|e| Error::usage(format!("CRS `{definition}` is not understood: {e}")))?;
+        if proj.is_geocent() {
+            return Err(Error::usage(format!(
+                "{name} has geocentric coordinates (X, Y, Z), which are no map; reproject with `gdalwarp -t_srs`"
+            )));
+        }
+        let (ground, unit) = if proj.is_latlong() {
+            let (a, b) = proj.ellipse_parameters();
+            (Ground::Ellipsoid { semi_major: a, flattening: (a - b) / a }, "degree".to_owned())
+        } else {
+            let metres_per_unit = proj.to_meter();
+            (Ground::Plane { metres_per_unit }, unit_name(metres_per_unit))
+        };
+        // South-African "Lo" grids count west and south; which way their files do is anyone's guess.
+        let known = proj.is_normalized_axis();
+        let projection = known.then(|| Arc::new(Projection { definition, proj }));
+        Ok(Self { epsg: None, name: name.to_owned(), unit, ground, projection, caveat, keys: None })
+    }
+
+    /// The CRS that the GeoKeys of a GeoTIFF describe.
+    pub(super) fn from_geo_keys(keys: GeoKeys) -> Result<Self> {
+        let codes = [key::PROJECTED_CRS, key::GEOGRAPHIC_CRS].map(|k| keys.code(k));
+        let crs = match (keys.short(key::MODEL_TYPE), codes) {
+            (Some(3), _) => {
+                return Err(Error::usage(
+                    "the coordinates are geocentric (X, Y, Z), which are no map; reproject with `gdalwarp -t_srs`",
+                ));
+            }
+            (_, [Some(code), _]) => Self::from_epsg(code).or_else(|e| keys.named_crs().ok_or(e))?,
+            (Some(2) | None, [None, Some(code)]) => {
+                Self::from_epsg(code).or_else(|e| keys.user_geographic_crs().map_err(|_| e))?
+            }
+            (Some(1), _) => keys.user_projected_crs()?,
+            (Some(2), _) => keys.user_geographic_crs()?,
+            _ => match keys.named_crs() {
+                Some(crs) => crs,
+                None => return Ok(Self::none()),
+            },
+        };
+        Ok(Self { keys: Some(Arc::new(keys.horizontal())), ..crs })
+    }
+
+    /// The CRS of well-known text, as in a `.prj` file: by its EPSG code, by a UTM zone in its name, or else
+    /// by name and unit only.
+    pub(super) fn from_wkt(wkt: &str) -> Result<Self> {
+        let name = wkt_name(wkt);
+        let code = wkt_authority(wkt).or_else(|| code_of_name(name));
+        if let Some(crs) = code.and_then(|code| Self::from_epsg(code).ok()) {
+            return Ok(crs);
+        }
+        match wkt_unit(wkt) {
+            Some((unit, size)) if wkt.trim_start().starts_with("PROJ") && size > 0.0 => {
+                Ok(Self::named(name, unit, size))
+            }
+            Some((_, size)) if (size - 1f64.to_radians()).abs() < 1e-9 => Ok(Self {
+                caveat: Some(
+                    "its datum is taken as WGS84; places may be some hundred metres off".to_owned(),
+                ),
+                ..Self::from_proj("+proj=longlat +datum=WGS84", name)?
+            }),
+            _ => Err(Error::usage(
+                "the CRS description names no EPSG code and no unit that is understood; replace it by the WKT that \
+                 `gdalsrsinfo -o wkt1 EPSG:...` prints, or remove it to have map units taken as metres",
+            )),
+        }
     }
 
     /// EPSG code, if it has one.
     #[must_use]
     pub fn epsg(&self) -> Option<u32> {
-        todo!()
+        self.epsg
     }
 
     /// Name for people: `EPSG:32631 WGS 84 / UTM zone 31N`, `none`, or what the file calls it.
     #[must_use]
     pub fn name(&self) -> String {
-        todo!()
+        match self.epsg {
+            Some(code) => format!("EPSG:{code} {}", self.name).trim_end().to_owned(),
+            None => self.name.clone(),
+        }
     }
 
     /// Name of the map unit: `metre`, `US survey foot`, `degree`.
     #[must_use]
     pub fn unit(&self) -> &str {
-        todo!()
+        &self.unit
     }
 
     /// How map units measure on the ground.
     #[must_use]
     pub fn ground(&self) -> Ground {
-        todo!()
+        self.ground
     }
 
     /// Whether map coordinates are longitude and latitude in degrees.
     #[must_use]
     pub fn is_geographic(&self) -> bool {
-        todo!()
+        matches!(self.ground, Ground::Ellipsoid { .. })
     }
 
-    /// WGS84 longitude and latitude in degrees of map coordinates.
+    /// Whether nothing is known but that map coordinates are metres: [`Crs::none`].
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::none()
+    }
+
+    /// How far longitudes and latitudes may be off, if more than a few metres.
+    #[must_use]
+    pub fn caveat(&self) -> Option<&str> {
+        self.caveat.as_deref()
+    }
+
+    /// The GeoKeys of the GeoTIFF it was read from, to be written back where there is no EPSG code.
+    ///
+    /// The horizontal part only, and always for `PixelIsArea`, whatever the file had.
+    #[must_use]
+    pub fn geo_keys(&self) -> Option<&GeoKeys> {
+        self.keys.as_deref()
+    }
+
+    /// Longitude (−180 to 180) and latitude in degrees of map coordinates: on WGS84 for the Earth, on its own
+    /// sphere for another body.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if there is no CRS or the point cannot be projected.
+    /// [`Error::Usage`] if there is no CRS or the point cannot be projected.
     pub fn to_lonlat(&self, map: DVec2) -> Result<DVec2> {
-        todo!()
+        let proj = self.projection()?;
+        let from = if proj.is_latlong() { radians(map) } else { map };
+        let to = transform(proj, &WGS84, from).ok_or_else(|| {
+            Error::usage(format!(
+                "map coordinates {map} lie outside the projection {}",
+                self.name()
+            ))
+        })?;
+        Ok(DVec2::new(wrap_degrees(to.x.to_degrees()), to.y.to_degrees()))
     }
 
-    /// Map coordinates of WGS84 longitude and latitude in degrees.
+    /// Map coordinates of WGS84 longitude and latitude in degrees (its own sphere's for another body).
+    ///
+    /// In a geographic CRS the result lies within −180 and 180;
+    /// [`Terrain::from_lonlat`](crate::Terrain::from_lonlat) finds it on a grid across the date line too.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) if there is no CRS or the point cannot be projected.
+    /// [`Error::Usage`] if there is no CRS or the point cannot be projected.
     pub fn from_lonlat(&self, lonlat: DVec2) -> Result<DVec2> {
-        todo!()
+        let proj = self.projection()?;
+        let to = transform(&WGS84, proj, radians(lonlat)).ok_or_else(|| {
+            Error::usage(format!(
+                "longitude {} and latitude {} lie outside the projection {}",
+                lonlat.x,
+                lonlat.y,
+                self.name()
+            ))
+        })?;
+        if !proj.is_latlong() {
+            return Ok(to);
+        }
+        Ok(DVec2::new(wrap_degrees(to.x.to_degrees()), to.y.to_degrees()))
+    }
+
+    fn projection(&self) -> Result<&Proj> {
+        match &self.projection {
+            Some(projection) => Ok(&projection.proj),
+            None => Err(Error::usage(format!(
+                "the terrain's CRS is {}, from which there is no way to longitude and latitude; \
+                 give places in map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+                self.name()
+            ))),
+        }
+    }
+}
+
+/// Through `proj4rs`, which takes radians for degrees; `None` where the projection has no answer.
+fn transform(from: &Proj, to: &Proj, point: DVec2) -> Option<DVec2> {
+    let (x, y) = transform_xy(from, to, point.x, point.y).ok()?;
+    let result = DVec2::new(x, y);
+    result.is_finite().then_some(result)
+}
+
+fn radians(lonlat: DVec2) -> DVec2 {
+    DVec2::new(wrap_degrees(lonlat.x).to_radians(), lonlat.y.to_radians())
+}
+
+/// The same longitude within −180 and 180; what is within already stays as it is.
+fn wrap_degrees(lon: f64) -> f64 {
+    if lon.abs() <= 180.0 { lon } else { (lon + 180.0).rem_euclid(360.0) - 180.0 }
+}
+
+/// Puts mean datum shifts in the place of grid files that are not at hand, and says what that costs.
+fn without_shift_grids(definition: &str) -> (String, Option<String>) {
+    /// What to replace, by what, and the caveat. NAD27: EPSG transformation 1173; NZGD49: EPSG 1564.
+    const SHIFTS: [(&str, &str, &str); 3] = [
+        (
+            "+datum=NAD27",
+            "+ellps=clrk66 +towgs84=-8,160,176",
+            "longitudes and latitudes from NAD27 use the mean shift of the contiguous United States, good to \
+             about 10 m there and possibly 100 m off elsewhere",
+        ),
+        (
+            "+nadgrids=nzgd2kgrid0005.gsb",
+            "+towgs84=59.47,-5.04,187.44,0.47,-0.1,1.024,-4.5993",
+            "longitudes and latitudes from NZGD49 use its mean shift, good to about 4 m",
+        ),
+        (
+            "+proj=krovak",
+            "+proj=krovak",
+            "longitudes and latitudes from the Krovak projection are about 8 m off",
+        ),
+    ];
+    match SHIFTS.iter().find(|(grid, ..)| definition.contains(grid)) {
+        Some((grid, shift, caveat)) => {
+            (definition.replace(grid, shift), Some((*caveat).to_owned()))
+        }
+        None => (definition.to_owned(), None),
+    }
+}
+
+/// Name of a unit of length by its size in metres.
+fn unit_name(metres: f64) -> String {
+    let named = [
+        (1.0, "metre"),
+        (0.3048, "foot"),
+        (1200.0 / 3937.0, "US survey foot"),
+        (1000.0, "kilometre"),
+    ];
+    match named.iter().find(|(size, _)| (size - metres).abs() < 1e-9 * size) {
+        Some((_, name)) => (*name).to_owned(),
+        None => format!("unit of {metres} m"),
+    }
+}
+
+/// Name and metres of an EPSG unit of length.
+pub(super) fn length_unit(code: u16) -> Option<(&'static str, f64)> {
+    Some(match code {
+        9001 => ("metre", 1.0),
+        9002 => ("foot", 0.3048),
+        9003 => ("US survey foot", 1200.0 / 3937.0),
+        9005 => ("Clarke's foot", 0.304_797_265_4),
+        9036 => ("kilometre", 1000.0),
+        _ => return None,
+    })
+}
+
+/// The first quoted text of well-known text: what the CRS is called.
+fn wkt_name(wkt: &str) -> &str {
+    wkt.split('"').nth(1).unwrap_or("")
+}
+
+/// The last `UNIT["name",size` of well-known text, which is the one of the outermost CRS.
+fn wkt_unit(wkt: &str) -> Option<(&str, f64)> {
+    let (_, unit) = wkt.rsplit_once("UNIT[\"")?;
+    let (name, rest) = unit.split_once('"')?;
+    let size = rest.trim_start_matches([',', ' ']).split([',', ']']).next()?;
+    Some((name, size.trim().parse().ok()?))
+}
+
+/// The EPSG code that closes well-known text: `AUTHORITY["EPSG","…"]]`, or in WKT 2 `ID["EPSG",…]]`.
+fn wkt_authority(wkt: &str) -> Option<u32> {
+    let wkt = wkt.trim_end();
+    let (_, authority) = wkt.rsplit_once("\"EPSG\"")?;
+    let digits = authority.trim_start_matches([',', ' ', '"']);
+    let (code, rest) = digits.split_at(digits.find(|c: char| !c.is_ascii_digit())?);
+    // Only the code of the whole: nothing but closing brackets may follow, and just two of them.
+    (rest.trim_start_matches('"').trim() == "]]").then(|| code.parse().ok()).flatten()
+}
+
+/// EPSG code of a name such as `WGS_1984_UTM_Zone_11N`, `NAD27 / UTM zone 10N` or `GCS_WGS_1984`.
+fn code_of_name(name: &str) -> Option<u32> {
+    let name = name.to_ascii_uppercase().replace('_', " ");
+    let datum =
+        |list: &[(&str, u32)]| list.iter().find(|(d, _)| name.contains(d)).map(|(_, code)| *code);
+    let Some((_, zone)) = name.split_once("UTM ZONE ") else {
+        let geographic = name.starts_with("GCS ") || !name.contains(" / ");
+        return geographic
+            .then(|| {
+                datum(&[
+                    ("WGS 1984", 4326),
+                    ("WGS 84", 4326),
+                    ("NORTH AMERICAN 1983", 4269),
+                    ("ETRS 1989", 4258),
+                ])
+            })
+            .flatten();
+    };
+    let digits = zone.find(|c: char| !c.is_ascii_digit()).unwrap_or(zone.len());
+    let number: u32 = zone[..digits].parse().ok().filter(|n| (1..=60).contains(n))?;
+    if zone[digits..].trim_start().starts_with('S') {
+        return datum(&[("WGS 84", 32700), ("WGS 1984", 32700)]).map(|base| base + number);
+    }
+    let bases = [
+        ("WGS 84", 32600),
+        ("WGS 1984", 32600),
+        ("NAD83", 26900),
+        ("NAD 1983", 26900),
+        ("NAD27", 26700),
+        ("NAD 1927", 26700),
+        ("ETRS89", 25800),
+        ("ETRS 1989", 25800),
+    ];
+    datum(&bases).map(|base| base + number)
+}
+
+/// Value of a key whose meaning the file spells out itself.
+const USER_DEFINED: u16 = 32767;
+
+/// GeoKey numbers that are used (OGC 19-008r4, annex B).
+pub(super) mod key {
+    pub(crate) const MODEL_TYPE: u16 = 1024;
+    pub(crate) const RASTER_TYPE: u16 = 1025;
+    pub(crate) const CITATION: u16 = 1026;
+    pub(crate) const GEOGRAPHIC_CRS: u16 = 2048;
+    pub(crate) const GEOGRAPHIC_CITATION: u16 = 2049;
+    pub(crate) const GEODETIC_DATUM: u16 = 2050;
+    pub(crate) const ANGULAR_UNITS: u16 = 2054;
+    pub(crate) const ELLIPSOID: u16 = 2056;
+    pub(crate) const SEMI_MAJOR: u16 = 2057;
+    pub(crate) const SEMI_MINOR: u16 = 2058;
+    pub(crate) const INVERSE_FLATTENING: u16 = 2059;
+    pub(crate) const PROJECTED_CRS: u16 = 3072;
+    pub(crate) const PROJECTED_CITATION: u16 = 3073;
+    pub(crate) const METHOD: u16 = 3075;
+    pub(crate) const LINEAR_UNITS: u16 = 3076;
+    pub(crate) const LINEAR_UNIT_SIZE: u16 = 3077;
+    pub(crate) const STD_PARALLEL_1: u16 = 3078;
+    pub(crate) const STD_PARALLEL_2: u16 = 3079;
+    /// Longitude of natural origin, false origin, centre, or straight vertical pole.
+    pub(crate) const ORIGIN_LON: [u16; 4] = [3080, 3084, 3088, 3095];
+    /// Latitude of natural origin, false origin, centre.
+    pub(crate) const ORIGIN_LAT: [u16; 3] = [3081, 3085, 3089];
+    /// False easting at natural origin, false origin, centre.
+    pub(crate) const EASTING: [u16; 3] = [3082, 3086, 3090];
+    /// False northing at natural origin, false origin, centre.
+    pub(crate) const NORTHING: [u16; 3] = [3083, 3087, 3091];
+    /// Scale at natural origin or centre.
+    pub(crate) const SCALE: [u16; 2] = [3092, 3093];
+    pub(crate) const VERTICAL_CRS: u16 = 4096;
+    pub(crate) const VERTICAL_UNITS: u16 = 4099;
+}
+
+impl GeoKeys {
+    /// `(location, count, value or offset)` of a key.
+    fn find(&self, key: u16) -> Option<(u16, usize, u16)> {
+        let (entries, _) = self.directory.get(4..)?.as_chunks::<4>();
+        entries.iter().find(|e| e[0] == key).map(|e| (e[1], e[2].into(), e[3]))
+    }
+
+    /// A key's code.
+    pub(super) fn short(&self, key: u16) -> Option<u16> {
+        self.find(key).filter(|(location, ..)| *location == 0).map(|(.., value)| value)
+    }
+
+    /// A key's EPSG code, if it is one: neither undefined nor user-defined.
+    fn code(&self, key: u16) -> Option<u32> {
+        self.short(key).filter(|code| *code != 0 && *code != USER_DEFINED).map(u32::from)
+    }
+
+    fn double(&self, key: u16) -> Option<f64> {
+        let (location, _, offset) = self.find(key)?;
+        (location == 34736).then(|| self.doubles.get(usize::from(offset)).copied()).flatten()
+    }
+
+    fn text(&self, key: u16) -> Option<&str> {
+        let (location, count, offset) = self.find(key)?;
+        let start = usize::from(offset);
+        let text = (location == 34737).then(|| self.ascii.get(start..start + count)).flatten()?;
+        text.split('|').next().filter(|t| !t.is_empty())
+    }
+
+    /// Without the vertical part, and for `PixelIsArea`.
+    fn horizontal(&self) -> Self {
+        let (entries, _) = self.directory.get(4..).unwrap_or_default().as_chunks::<4>();
+        let entries: Vec<_> = entries
+            .iter()
+            .filter(|e| e[0] < key::VERTICAL_CRS)
+            .map(|e| if e[0] == key::RASTER_TYPE { [key::RASTER_TYPE, 0, 1, 1] } else { *e })
+            .collect();
+        let mut directory = self.directory.get(..3).unwrap_or(&[1, 1, 0]).to_vec();
+        directory.push(entries.len() as u16);
+        directory.extend(entries.iter().flatten());
+        Self { directory, doubles: self.doubles.clone(), ascii: self.ascii.clone() }
+    }
+
+    /// Metres per unit of a projected CRS; metres if nothing is said.
+    fn metres_per_unit(&self) -> Result<f64> {
+        match self.short(key::LINEAR_UNITS) {
+            None => Some(1.0),
+            Some(USER_DEFINED) => self.double(key::LINEAR_UNIT_SIZE).filter(|m| m.is_finite() && *m > 0.0),
+            Some(code) => length_unit(code).map(|(_, metres)| metres),
+        }
+        .ok_or_else(|| {
+            Error::usage(
+                "the unit of the map coordinates is not known, so the size of a cell on the ground is not either; \
+                 reproject with `gdalwarp -t_srs EPSG:...`, or name the right CRS with `gdal_edit.py -a_srs EPSG:...`",
+            )
+        })
+    }
+
+    fn crs_name(&self) -> &str {
+        let citations = [key::PROJECTED_CITATION, key::CITATION, key::GEOGRAPHIC_CITATION];
+        citations.iter().find_map(|k| self.text(*k)).unwrap_or("unnamed")
+    }
+
+    /// A CRS of which only the unit is known, and perhaps a code.
+    fn named_crs(&self) -> Option<Crs> {
+        self.short(key::LINEAR_UNITS)?;
+        let metres = self.metres_per_unit().ok()?;
+        Some(Crs {
+            epsg: self.code(key::PROJECTED_CRS),
+            ..Crs::named(self.crs_name(), &unit_name(metres), metres)
+        })
+    }
+
+    fn user_projected_crs(&self) -> Result<Crs> {
+        let name = self.crs_name();
+        let metres = self.metres_per_unit()?;
+        let plain = Crs::named(name, &unit_name(metres), metres);
+        if name.contains("Pseudo-Mercator") || name.contains("Web_Mercator") {
+            return Crs::from_epsg(3857);
+        }
+        let (Some(conversion), Some((datum, caveat))) = (self.conversion(metres), self.datum())
+        else {
+            return Ok(plain);
+        };
+        let definition = format!("{conversion} {datum} +to_meter={metres} +no_defs");
+        Ok(match Crs::from_proj(&definition, name) {
+            Ok(crs) => Crs { caveat: crs.caveat.or(caveat), ..crs },
+            Err(_) => plain,
+        })
+    }
+
+    fn user_geographic_crs(&self) -> Result<Crs> {
+        let unit = self.short(key::ANGULAR_UNITS).unwrap_or(9102);
+        if !matches!(unit, 9102 | 9122) {
+            return Err(Error::usage(format!(
+                "angles are in EPSG unit {unit}, not degrees; reproject with `gdalwarp -t_srs EPSG:4326`"
+            )));
+        }
+        let Some((datum, caveat)) = self.datum() else {
+            return Err(Error::usage(
+                "a geographic CRS without an ellipsoid; name the right one with `gdal_edit.py -a_srs EPSG:...`",
+            ));
+        };
+        let crs = Crs::from_proj(&format!("+proj=longlat {datum} +no_defs"), self.crs_name())?;
+        Ok(Crs { caveat: crs.caveat.or(caveat), ..crs })
+    }
+
+    /// The ellipsoid and datum shift in PROJ.4 notation, and a caveat if the shift is not known.
+    fn datum(&self) -> Option<(String, Option<String>)> {
+        // EPSG numbers a datum 6000 + n where the geographic CRS on it is 4000 + n, an ellipsoid 7000 + n
+        // where the CRS "on an unknown datum based upon it" is 4000 + n (OGC 19-008r4, annex C).
+        let coded = |key, base: u16| {
+            self.short(key).filter(|c| (base..base + 1000).contains(c)).map(|c| c - base + 4000)
+        };
+        let code = coded(key::GEOGRAPHIC_CRS, 4000).or_else(|| coded(key::GEODETIC_DATUM, 6000));
+        let tokens = |code| {
+            let definition = crs_definitions::from_code(code)?.proj4;
+            let rest = definition.strip_prefix("+proj=longlat ")?;
+            Some(rest.trim_end_matches("+no_defs").trim().to_owned())
+        };
+        if let Some(known) = code.and_then(tokens) {
+            return Some((known, None));
+        }
+        let semi_major = self.double(key::SEMI_MAJOR).filter(|a| a.is_finite() && *a > 0.0);
+        let ellipsoid = match (
+            semi_major,
+            self.double(key::INVERSE_FLATTENING),
+            self.double(key::SEMI_MINOR),
+        ) {
+            (Some(a), Some(rf), _) if rf > 1.0 => format!("+a={a} +rf={rf}"),
+            (Some(a), _, Some(b)) if b > 0.0 && b < a => format!("+a={a} +b={b}"),
+            (Some(a), ..) => format!("+R={a}"),
+            (None, ..) => tokens(coded(key::ELLIPSOID, 7000)?)?,
+        };
+        let on_earth = semi_major.is_none_or(|a| (a - 6_371_000.0).abs() < 20_000.0);
+        let caveat = "the file does not name its datum; longitudes and latitudes may be some hundred metres off";
+        Some((ellipsoid, on_earth.then(|| caveat.to_owned())))
+    }
+
+    /// The map projection in PROJ.4 notation, for the methods that DEMs come in.
+    fn conversion(&self, metres_per_unit: f64) -> Option<String> {
+        let first = |keys: &[u16]| keys.iter().find_map(|k| self.double(*k));
+        let lat_0 = first(&key::ORIGIN_LAT).unwrap_or(0.0);
+        let lon_0 = first(&key::ORIGIN_LON).unwrap_or(0.0);
+        let parallel_1 = self.double(key::STD_PARALLEL_1);
+        let parallel_2 = self.double(key::STD_PARALLEL_2).or(parallel_1);
+        let true_scale = parallel_1.map(|lat| format!(" +lat_ts={lat}")).unwrap_or_default();
+        let method = match self.short(key::METHOD)? {
+            1 => format!("+proj=tmerc +lat_0={lat_0}"),
+            7 => format!("+proj=merc{true_scale}"),
+            8 => format!("+proj=lcc +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
+            9 => format!("+proj=lcc +lat_1={lat_0} +lat_0={lat_0}"),
+            10 => format!("+proj=laea +lat_0={lat_0}"),
+            11 => format!("+proj=aea +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
+            15 => format!("+proj=stere +lat_0={} +lat_ts={lat_0}", 90f64.copysign(lat_0)),
+            17 => format!("+proj=eqc{true_scale} +lat_0={lat_0}"),
+            24 => "+proj=sinu".to_owned(),
+            _ => return None,
+        };
+        let scale = first(&key::SCALE).unwrap_or(1.0);
+        let [x_0, y_0] =
+            [key::EASTING, key::NORTHING].map(|k| first(&k).unwrap_or(0.0) * metres_per_unit);
+        Some(format!("{method} +lon_0={lon_0} +k={scale} +x_0={x_0} +y_0={y_0}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn assert_near(a: DVec2, b: DVec2, tolerance: f64) {
+        assert!((a - b).length() < tolerance, "{a} and {b} differ by {}", (a - b).length());
+    }
+
+    #[test]
+    fn codes_have_names_units_and_grounds() {
+        let utm = Crs::from_epsg(32631).unwrap();
+        assert_eq!(utm.name(), "EPSG:32631 WGS 84 / UTM zone 31N");
+        assert_eq!((utm.unit(), utm.ground(), utm.epsg()), ("metre", Ground::METRES, Some(32631)));
+        let feet = Crs::from_epsg(2225).unwrap();
+        assert_eq!(feet.unit(), "US survey foot");
+        assert_eq!(feet.ground(), Ground::Plane { metres_per_unit: 1200.0 / 3937.0 });
+        assert_eq!(Crs::from_epsg(3857).unwrap().ground(), Ground::WebMercator);
+        let wgs84 = Crs::from_epsg(4326).unwrap();
+        assert!(wgs84.is_geographic() && wgs84.unit() == "degree");
+        let Ground::Ellipsoid { semi_major, flattening } = wgs84.ground() else { panic!() };
+        assert_eq!(semi_major, 6_378_137.0);
+        assert!((1.0 / flattening - 298.257_223_563).abs() < 1e-6);
+        assert_eq!(Crs::none().name(), "none");
+        assert!(Crs::none().is_none() && !utm.is_none());
+    }
+
+    #[test]
+    fn unknown_codes_and_foreign_units_are_refused() {
+        assert!(Crs::from_epsg(1).is_err());
+        assert!(Crs::from_epsg(4_000_000).is_err());
+        // NTF (Paris), in grads.
+        assert!(Crs::from_epsg(4807).unwrap_err().to_string().contains("grad"));
+        assert!(Crs::none().to_lonlat(DVec2::ZERO).unwrap_err().to_string().contains("none"));
+    }
+
+    #[test]
+    fn known_places_are_where_they_are() {
+        // The central meridian of zone 31 is 3° E at easting 500 km.
+        let utm = Crs::from_epsg(32631).unwrap();
+        assert_near(utm.to_lonlat(DVec2::new(500_000.0, 0.0)).unwrap(), DVec2::new(3.0, 0.0), 1e-9);
+        // Web Mercator's corner: 180° at π·a.
+        let corner = DVec2::splat(std::f64::consts::PI * 6_378_137.0);
+        let web = Crs::from_epsg(3857).unwrap();
+        assert_near(web.to_lonlat(corner).unwrap(), DVec2::new(180.0, 85.051_128_78), 1e-6);
+        // The worked example of EPSG Guidance Note 7-2 (OSGB36 / British National Grid): the
+        // geographic coordinates there are on OSGB36, about 100 m from WGS84.
+        let bng = Crs::from_epsg(27700).unwrap();
+        let place = bng.to_lonlat(DVec2::new(577_274.99, 69_740.50)).unwrap();
+        assert_near(place, DVec2::new(0.5, 50.5), 2e-3);
+    }
+
+    #[test]
+    fn there_and_back_is_the_identity() {
+        for (code, map) in [
+            (32719, DVec2::new(400_000.0, 6_400_000.0)),
+            (27700, DVec2::new(340_000.0, 520_000.0)),
+            (3031, DVec2::new(-500_000.0, 800_000.0)),
+            (2225, DVec2::new(6_000_000.0, 2_000_000.0)),
+            (31287, DVec2::new(167_455.0, 361_955.0)),
+            (26710, DVec2::new(560_000.0, 5_115_000.0)),
+            (4326, DVec2::new(-118.2, 34.6)),
+            (4269, DVec2::new(-118.2, 34.6)),
+        ] {
+            let crs = Crs::from_epsg(code).unwrap();
+            let back = crs.from_lonlat(crs.to_lonlat(map).unwrap()).unwrap();
+            assert_near(back, map, if crs.is_geographic() { 1e-9 } else { 1e-3 });
+        }
+    }
+
+    #[test]
+    fn nad27_is_shifted_by_about_a_hundred_metres_and_says_so() {
+        let nad27 = Crs::from_epsg(4267).unwrap();
+        let place = DVec2::new(-122.2, 46.2);
+        let shift =
+            (nad27.to_lonlat(place).unwrap() - place) * Ground::WGS84.metres_per_unit(place.y);
+        assert!((60.0..150.0).contains(&shift.length()), "{shift}");
+        assert!(nad27.caveat().unwrap().contains("NAD27"));
+    }
+
+    #[test]
+    fn longitudes_wrap() {
+        let wgs84 = Crs::from_epsg(4326).unwrap();
+        assert_near(
+            wgs84.to_lonlat(DVec2::new(181.0, 10.0)).unwrap(),
+            DVec2::new(-179.0, 10.0),
+            1e-9,
+        );
+        assert_near(
+            wgs84.from_lonlat(DVec2::new(350.0, 10.0)).unwrap(),
+            DVec2::new(-10.0, 10.0),
+            1e-9,
+        );
+        assert!(wgs84.from_lonlat(DVec2::new(f64::NAN, 10.0)).is_err());
+    }
+
+    #[test]
+    fn well_known_text_gives_the_code_the_zone_or_the_unit() {
+        let code = |wkt: &str| Crs::from_wkt(wkt).unwrap().epsg();
+        assert_eq!(code(crs_definitions::from_code(31287).unwrap().wkt), Some(31287));
+        assert_eq!(
+            code(r#"PROJCS["WGS_1984_UTM_Zone_11N",GEOGCS["GCS_WGS_1984"],UNIT["Meter",1.0]]"#),
+            Some(32611)
+        );
+        assert_eq!(code(r#"PROJCS["WGS_1984_UTM_Zone_19S",UNIT["Meter",1.0]]"#), Some(32719));
+        assert_eq!(code(r#"GEOGCS["GCS_WGS_1984",UNIT["Degree",0.0174532925199433]]"#), Some(4326));
+        // The code of a part is not the code of the whole.
+        let local =
+            r#"PROJCS["Site grid",GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]],UNIT["foot",0.3048]]"#;
+        let crs = Crs::from_wkt(local).unwrap();
+        assert_eq!((crs.epsg(), crs.name()), (None, "Site grid".to_owned()));
+        assert_eq!(crs.ground(), Ground::Plane { metres_per_unit: 0.3048 });
+        assert!(Crs::from_wkt("Projection UTM").is_err());
+    }
+
+    #[test]
+    fn geo_keys_spell_out_a_transverse_mercator_in_feet() {
+        let doubles = vec![3.0, 0.9996, 500_000.0 / 0.3048];
+        let directory = [
+            [1, 1, 0, 9],
+            [1024, 0, 1, 1],
+            [1025, 0, 1, 2],
+            [2048, 0, 1, 4326],
+            [3072, 0, 1, 32767],
+            [3075, 0, 1, 1],
+            [3076, 0, 1, 9002],
+            [3080, 34736, 1, 0],
+            [3092, 34736, 1, 1],
+            [3082, 34736, 1, 2],
+            [4099, 0, 1, 9002],
+        ];
+        let keys = GeoKeys { directory: directory.concat(), doubles, ascii: String::new() };
+        let crs = Crs::from_geo_keys(keys).unwrap();
+        let utm = Crs::from_epsg(32631).unwrap();
+        let at = DVec2::new(400_000.0, 4_700_000.0);
+        assert_near(crs.to_lonlat(at / 0.3048).unwrap(), utm.to_lonlat(at).unwrap(), 1e-9);
+        let kept = crs.geo_keys().unwrap();
+        assert_eq!(kept.short(key::RASTER_TYPE), Some(1));
+        assert_eq!(kept.short(key::VERTICAL_UNITS), None);
+        assert_eq!(kept.directory.len(), 4 * (1 + usize::from(kept.directory[3])));
     }
 }

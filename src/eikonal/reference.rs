@@ -1,0 +1,40 @@
+//! The slow and obviously right solver: judge of the tests.
+
+use super::field::TensorField;
+use super::source::StartRegion;
+use super::tiles::Values;
+use super::update::UNREACHED;
+use super::{DistanceMap, Statistics, best_foot};
+use crate::{Control, Result};
+
+/// The same start values and the same discrete equation as [`Solver`](super::Solver), but each node's update is the plain
+/// minimum over the ring and whole-grid Gauss–Seidel sweeps go on until no node changes at all.
+///
+/// # Errors
+/// Cancelled.
+pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Result<DistanceMap> {
+    let mut values = Values::unreached(field.tiling);
+    start.seed(&field, |col, row, value| values.lower(col, row, value as f32));
+    let (cols, rows) = (field.cols(), field.rows());
+    let mut changed = true;
+    let mut sweep = 0;
+    while changed {
+        control.check()?;
+        changed = false;
+        for j in 0..rows {
+            let row = if sweep & 2 == 0 { j } else { rows - 1 - j };
+            for i in 0..cols {
+                let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
+                let old = values.get(col, row);
+                let new = best_foot(&field, &values, col, row).map_or(UNREACHED, |(g, _)| g as f32);
+                if new < old {
+                    values.lower(col, row, new);
+                    changed = true;
+                }
+            }
+        }
+        sweep += 1;
+    }
+    let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
+    Ok(DistanceMap { field, values, start: start.clone(), statistics, unit: "", frame: None })
+}

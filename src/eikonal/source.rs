@@ -1,0 +1,187 @@
+//! Start regions: points between nodes, lines, areas.
+
+use glam::DVec2;
+
+use super::field::TensorField;
+use super::update::segment;
+use crate::Sym2;
+
+/// Where distance is zero, in grid coordinates (column, row).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StartRegion {
+    /// Single points, on nodes or between them.
+    pub points: Vec<DVec2>,
+    /// Polylines.
+    pub lines: Vec<Vec<DVec2>>,
+    /// Areas: closed rings, inside by the even-odd rule.
+    pub areas: Vec<Vec<Vec<DVec2>>>,
+}
+
+impl From<DVec2> for StartRegion {
+    fn from(point: DVec2) -> Self {
+        Self { points: vec![point], ..Self::default() }
+    }
+}
+
+/// Around a point, nodes this near get the length of the straight step to it. Near a point source the distance is a
+/// cone, on which the update is only first order with a large constant; a ball of fixed size in cells costs
+/// nothing in order and is safe on any metric (a larger one is not where the metric varies).
+const POINT_RADIUS: f64 = 5.0;
+/// Around a line or the border of an area: enough that every triangle next to it has values.
+const LINE_RADIUS: f64 = 1.5;
+
+impl StartRegion {
+    /// Whether there is nothing in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty() && self.lines.is_empty() && self.areas.is_empty()
+    }
+
+    /// Whether grid coordinates lie in one of the areas.
+    #[must_use]
+    pub fn covers(&self, at: DVec2) -> bool {
+        self.areas.iter().any(|rings| {
+            let crossings =
+                rings.iter().flat_map(|ring| closed_segments(ring)).filter(|&(a, b)| {
+                    (a.y > at.y) != (b.y > at.y)
+                        && at.x < a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x)
+                });
+            crossings.count() % 2 == 1
+        })
+    }
+
+    /// Start values in stored units: calls `set(col, row, value)` for nodes on and near the region.
+    pub(super) fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
+        for &point in &self.points {
+            near(field, point, point, POINT_RADIUS, |col, row, node| {
+                if let Some(length) = straight(field, node, point) {
+                    set(col, row, length);
+                }
+            });
+        }
+        for (a, b) in self.segments() {
+            near(field, a, b, LINE_RADIUS, |col, row, node| {
+                if let Some(metric) = field.metric(col, row)
+                    && let (_, theta) = segment(0.0, a - node, 0.0, b - node, metric)
+                    && let Some(length) = straight(field, node, a.lerp(b, theta))
+                {
+                    set(col, row, length);
+                }
+            });
+        }
+        if !self.areas.is_empty() {
+            for row in 0..field.rows() {
+                for col in 0..field.cols() {
+                    if self.covers(DVec2::new(col as f64, row as f64)) && field.is_open(col, row) {
+                        set(col, row, 0.0);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Segments of the lines and of the borders of the areas.
+    fn segments(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+        let lines =
+            self.lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1])));
+        lines.chain(self.areas.iter().flatten().flat_map(|ring| closed_segments(ring)))
+    }
+
+    /// The point of the region that a traveller at `at`, nearer than `radius` cells, can go to in a straight
+    /// line, and the length of that (stored units); the shortest of them.
+    pub(crate) fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
+        if self.covers(at) {
+            return Some((at, 0.0));
+        }
+        let metric = field.metric_at(at)?;
+        let feet = self.segments().map(|(a, b)| {
+            let (_, theta) = segment(0.0, a - at, 0.0, b - at, metric);
+            a.lerp(b, theta)
+        });
+        self.points
+            .iter()
+            .copied()
+            .chain(feet)
+            .filter(|foot| foot.distance(at) <= radius)
+            .filter_map(|foot| Some((foot, straight(field, at, foot)?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+fn closed_segments(ring: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+    (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]))
+}
+
+/// Open nodes within `radius` cells of the segment, or at the corners of the cells it runs through.
+fn near(
+    field: &TensorField,
+    a: DVec2,
+    b: DVec2,
+    radius: f64,
+    mut visit: impl FnMut(usize, usize, DVec2),
+) {
+    let span = |lo: f64, hi: f64, count: usize| {
+        let first = (lo - radius).ceil().max(0.0) as usize;
+        let last = (hi + radius).floor().min(count as f64 - 1.0);
+        first..(last + 1.0).max(0.0) as usize
+    };
+    for row in span(a.y.min(b.y), a.y.max(b.y), field.rows()) {
+        for col in span(a.x.min(b.x), a.x.max(b.x), field.cols()) {
+            let node = DVec2::new(col as f64, row as f64);
+            let (_, theta) = segment(0.0, a - node, 0.0, b - node, Sym2::new(1.0, 0.0, 1.0));
+            if a.lerp(b, theta).distance(node) <= radius && field.is_open(col, row) {
+                visit(col, row, node);
+            }
+        }
+    }
+}
+
+/// Length of the straight way from `a` to `b` in stored units, by Simpson's rule with five points; `None` where a
+/// wall is in the way.
+fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
+    if !sees(field, a, b) {
+        return None;
+    }
+    let by = b - a;
+    let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
+    let mut sum = 0.0;
+    for (i, weight) in weights.into_iter().enumerate() {
+        sum += weight / 12.0 * field.metric_at(a + by * (i as f64 / 4.0))?.norm(by);
+    }
+    Some(sum)
+}
+
+/// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones.
+pub(crate) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
+    /// Samples per cell of length: a wall in a cell is crossed by more than one of them or hardly touched.
+    const DENSITY: f64 = 8.0;
+    let steps = (a.distance(b) * DENSITY).ceil().max(1.0);
+    (0..=steps as usize).all(|i| {
+        let p = a.lerp(b, i as f64 / steps);
+        let (col, row) = (p.x.floor().max(0.0) as usize, p.y.floor().max(0.0) as usize);
+        let open = |i: usize, j: usize| {
+            col + i >= field.cols() || row + j >= field.rows() || field.is_open(col + i, row + j)
+        };
+        let corners = [open(0, 0), open(1, 0), open(0, 1), open(1, 1)];
+        corners == [true; 4] || on_free_side(corners, p - p.floor(), a, b, p.floor())
+    })
+}
+
+/// In a cell with closed corners: whether the way stays on the side of its own end's corner.
+fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) -> bool {
+    // The nearest corner, or one of the nearest, must be open, ...
+    let distance = |i: usize| at.distance_squared(DVec2::new((i % 2) as f64, (i / 2) as f64));
+    let nearest = (0..4).map(distance).fold(f64::INFINITY, f64::min);
+    if !(0..4).any(|i| corners[i] && distance(i) <= nearest + 1e-9) {
+        return false;
+    }
+    // ... and where a wall runs along a diagonal, the whole way must lie on one side of it.
+    let side = |p: DVec2, rising: bool| {
+        let q = p - cell;
+        if rising { q.x - q.y } else { q.x + q.y - 1.0 }
+    };
+    let crosses = |rising: bool| side(a, rising) * side(b, rising) < 0.0;
+    let falling_wall = !corners[1] && !corners[2];
+    let rising_wall = !corners[0] && !corners[3];
+    !(falling_wall && crosses(false) || rising_wall && crosses(true))
+}

@@ -1,0 +1,262 @@
+//! The solver against closed forms and against the slow reference.
+
+use std::f64::consts::TAU;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::Sym2;
+
+const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
+
+fn rotated(ratio: f64, angle: f64) -> Sym2 {
+    let along = DVec2::from_angle(angle);
+    Sym2::outer(along) * ratio.sqrt() + Sym2::outer(along.perp()) * ratio.sqrt().recip()
+}
+
+fn field(
+    cols: usize,
+    rows: usize,
+    tensor: impl Fn(usize, usize) -> Option<Sym2> + Sync,
+) -> TensorField {
+    TensorField::from_fn(cols, rows, tensor, &Control::default()).unwrap()
+}
+
+fn solve(field: TensorField, start: DVec2) -> DistanceMap {
+    Solver::default().solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+}
+
+/// Without a tolerance, so that the order of the sweeps does not matter.
+fn exactly(field: TensorField, start: DVec2) -> DistanceMap {
+    let solver = Solver { tolerance: 0.0 };
+    solver.solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+}
+
+/// Largest and mean error over all nodes for which `exact` is known, relative to the largest and mean distance.
+fn errors(map: &DistanceMap, exact: impl Fn(usize, usize) -> Option<f64>) -> (f64, f64) {
+    let (mut worst, mut sum, mut largest, mut total) = (0f64, 0.0, 0f64, 0.0);
+    for row in 0..map.rows() {
+        for col in 0..map.cols() {
+            if let Some(g) = exact(col, row) {
+                let error = (map.at_node(col, row) - g).abs();
+                worst = worst.max(error);
+                sum += error;
+                largest = largest.max(g);
+                total += g;
+            }
+        }
+    }
+    (worst / largest, sum / total)
+}
+
+fn order(coarse: f64, fine: f64, refinement: f64) -> f64 {
+    (coarse / fine).ln() / refinement.ln()
+}
+
+#[test]
+fn constant_tensors_converge_to_the_norm() {
+    // First order up to the logarithm of a point source: h log h.
+    for (ratio, bound) in [(1.0, 1.4e-3), (4.0, 1.4e-3), (25.0, 1.4e-3), (100.0, 1.5e-3)] {
+        let d = rotated(ratio, 0.5);
+        let mean = [51, 101, 201, 401].map(|n| {
+            let centre = DVec2::splat((n / 2) as f64);
+            let map = solve(field(n, n, |_, _| Some(d)), centre);
+            let exact = |c, r| Some(d.inverse().norm(DVec2::new(c as f64, r as f64) - centre));
+            errors(&map, exact).1
+        });
+        assert!(mean[3] < bound, "ratio {ratio}: {mean:?}");
+        let orders: Vec<f64> = mean.windows(2).map(|pair| order(pair[0], pair[1], 2.0)).collect();
+        assert!(orders.is_sorted() && orders[2] > 0.6, "ratio {ratio}: {orders:?} in {mean:?}");
+    }
+}
+
+#[test]
+fn a_diffeomorphism_pulls_straight_lines_back() {
+    // D = (ΦᵀΦ)⁻¹ with Φ = Dφ: distance is ‖φ(x) − φ(x0)‖. φ bends the unit square slightly.
+    let phi = |p: DVec2| DVec2::new(p.x + 0.1 * (TAU * p.y).sin(), p.y + 0.1 * (TAU * p.x).sin());
+    let mean = [101, 201, 401].map(|n| {
+        let h = 1.0 / (n - 1) as f64;
+        let at = |c: usize, r: usize| DVec2::new(c as f64, r as f64) * h - 0.5;
+        let tensor = |c, r| {
+            let p = at(c, r);
+            let (a, b) = (0.1 * TAU * (TAU * p.y).cos(), 0.1 * TAU * (TAU * p.x).cos());
+            Some(Sym2::new(1.0 + b * b, a + b, 1.0 + a * a).inverse() * (h * h).recip())
+        };
+        let map = solve(field(n, n, tensor), DVec2::splat((n / 2) as f64));
+        // Inside this disc the segment to the centre stays in the image of the square.
+        let exact = |c, r| Some(phi(at(c, r)).length()).filter(|&g| g < 0.35);
+        errors(&map, exact).1
+    });
+    assert!(mean[2] < 6e-3 && order(mean[0], mean[2], 4.0) > 0.7, "{mean:?}");
+}
+
+#[test]
+fn no_direction_is_favoured_on_a_plane() {
+    let n = 441;
+    let centre = DVec2::splat(220.0);
+    let map = solve(field(n, n, |_, _| Some(IDENTITY)), centre);
+    for k in 0..720 {
+        let goal = centre + 200.0 * DVec2::from_angle(TAU * f64::from(k) / 720.0);
+        let error = map.at(goal).unwrap() / 200.0 - 1.0;
+        assert!(error.abs() < 4e-3, "{k}: {error}");
+    }
+}
+
+#[test]
+fn a_start_between_nodes_counts_from_itself() {
+    let start = DVec2::new(50.3, 49.8);
+    let map = solve(field(101, 101, |_, _| Some(IDENTITY)), start);
+    let exact = |c, r| Some((DVec2::new(c as f64, r as f64) - start).length());
+    assert!(errors(&map, exact).1 < 5e-3);
+    assert!((map.at(DVec2::new(51.3, 49.8)).unwrap() - 1.0).abs() < 1e-6);
+    assert_eq!(map.at(start), Some(0.0));
+}
+
+#[test]
+fn lines_and_areas_are_start_regions() {
+    let f = field(81, 61, |_, _| Some(rotated(4.0, 0.3)));
+    let m = rotated(4.0, 0.3).inverse();
+    // Distance to a straight line: |n·x| / √(nᵀ D n).
+    let (a, b) = (DVec2::new(-200.0, 10.2), DVec2::new(300.0, 35.7));
+    let line = StartRegion { lines: vec![vec![a, b]], ..StartRegion::default() };
+    let map = Solver::default().solve_field(f.clone(), &line, &[], &Control::default()).unwrap();
+    let normal = (b - a).perp();
+    let exact = |c, r| {
+        let p = DVec2::new(c as f64, r as f64);
+        // Farther out the nearest point of the line lies outside the grid.
+        (20..60).contains(&c).then(|| (p - a).dot(normal).abs() / m.inverse().norm(normal))
+    };
+    let (_, mean) = errors(&map, exact);
+    assert!(mean < 1e-4, "plane waves are exact up to rounding and tolerance: {mean}");
+
+    let square = vec![[20.0, 20.0], [40.0, 20.0], [40.0, 40.0], [20.0, 40.0]];
+    let ring: Vec<DVec2> = square.into_iter().map(DVec2::from).collect();
+    let area = StartRegion { areas: vec![vec![ring]], ..StartRegion::default() };
+    let map = Solver::default().solve_field(f, &area, &[], &Control::default()).unwrap();
+    assert_eq!(map.at_node(30, 30), 0.0);
+    assert!((map.at_node(30, 50) - 10.0 / m.inverse().norm(DVec2::Y)).abs() < 1e-3);
+}
+
+#[test]
+fn a_diagonal_wall_of_single_nodes_does_not_leak() {
+    for falling in [false, true] {
+        let wall = |c: usize, r: usize| if falling { c + r == 40 } else { c == r };
+        let map =
+            solve(field(41, 41, |c, r| (!wall(c, r)).then_some(IDENTITY)), DVec2::new(20.0, 4.0));
+        let beyond = if falling { (30, 30) } else { (4, 30) };
+        assert!(map.at_node(beyond.0, beyond.1).is_infinite());
+        assert!(map.at(DVec2::new(beyond.0 as f64 + 0.5, 30.5)).is_none());
+    }
+}
+
+#[test]
+fn goals_end_the_solve_early_with_final_values() {
+    let tensor = |c: usize, r: usize| Some(rotated(9.0, (c + 2 * r) as f64 * 0.01));
+    let f = field(301, 301, tensor);
+    let (start, goals) = (StartRegion::from(DVec2::splat(40.0)), [DVec2::new(70.4, 61.7)]);
+    let whole = Solver::default().solve_field(f.clone(), &start, &[], &Control::default()).unwrap();
+    let part = Solver::default().solve_field(f, &start, &goals, &Control::default()).unwrap();
+    assert!(part.statistics().activations * 3 < whole.statistics().activations);
+    assert_eq!(part.at(goals[0]), whole.at(goals[0]));
+}
+
+#[test]
+fn thread_count_changes_no_bit() {
+    let tensor = |c: usize, r: usize| {
+        let void = (c / 9 + r / 7) % 5 == 0 && c % 9 < 6;
+        (!void).then(|| rotated(1.0 + (c % 50) as f64, r as f64 * 0.1) * (1.0 + (r % 30) as f64))
+    };
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| solve(field(333, 257, tensor), DVec2::new(160.2, 120.9)))
+    };
+    let one = run(1);
+    for threads in [2, 4, 8] {
+        let map = run(threads);
+        assert_eq!(map.values.tiles, one.values.tiles);
+        assert_eq!(map.statistics(), one.statistics());
+    }
+}
+
+#[test]
+fn a_uniform_scale_of_the_tensor_scales_every_value_exactly() {
+    let d = |c: usize, r: usize| Some(rotated(9.0, 0.01 * (c * r) as f64));
+    let one = solve(field(90, 70, d), DVec2::new(30.0, 20.0));
+    for scale in [1e-12, 1.0 / 3.0, 1e10] {
+        let map = solve(field(90, 70, |c, r| d(c, r).map(|d| d * scale)), DVec2::new(30.0, 20.0));
+        let ratio = map.at_node(80, 60) / one.at_node(80, 60) * f64::sqrt(scale);
+        assert!((ratio - 1.0).abs() < 1e-5, "{scale}: {ratio}");
+    }
+}
+
+#[test]
+fn hopeless_starts_and_cancelling_are_errors() {
+    let f = || field(9, 9, |c, _| (c != 4).then_some(IDENTITY));
+    let control = Control::default();
+    let start = |at: DVec2| StartRegion::from(at);
+    let run = |start: StartRegion, control: &Control| {
+        Solver::default().solve_field(f(), &start, &[], control)
+    };
+    assert!(run(start(DVec2::new(4.0, 4.0)), &control).is_err());
+    assert!(run(start(DVec2::new(50.0, 4.0)), &control).is_err());
+    assert!(run(start(DVec2::NAN), &control).is_err());
+    assert!(run(StartRegion::default(), &control).is_err());
+    control.cancel.cancel();
+    assert!(matches!(run(start(DVec2::ONE), &control), Err(Error::Cancelled)));
+}
+
+/// A tensor of ratio up to 100, or a wall.
+fn any_tensor() -> impl Strategy<Value = Option<Sym2>> {
+    prop_oneof![
+        1 => Just(None),
+        5 => (0.0..100f64.ln(), 0.0..TAU, -2.0..2f64)
+            .prop_map(|(ratio, angle, speed)| Some(rotated(ratio.exp(), angle) * speed.exp())),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn agrees_with_the_reference_on_rough_fields(
+        tensors in proptest::collection::vec(any_tensor(), 24 * 37),
+        (x, y) in (0.0..23.0f64, 0.0..36.0f64),
+    ) {
+        let f = field(24, 37, |c, r| tensors[r * 24 + c]);
+        let start = StartRegion::from(DVec2::new(x, y));
+        let control = Control::default();
+        let solver = Solver { tolerance: 0.0 };
+        let fast = solver.solve_field(f.clone(), &start, &[], &control);
+        let Ok(fast) = fast else {
+            prop_assert!(!f.is_open(x.round() as usize, y.round() as usize));
+            return Ok(());
+        };
+        let slow = reference::solve(f, &start, &control).unwrap();
+        for row in 0..37 {
+            for col in 0..24 {
+                let (a, b) = (fast.at_node(col, row), slow.at_node(col, row));
+                prop_assert!(a == b || (a - b).abs() <= 1e-4 * b, "({col}, {row}): {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn mirrors_and_transposes_with_its_field(
+        tensors in proptest::collection::vec(any_tensor(), 20 * 20),
+    ) {
+        let at = |c: usize, r: usize| if (c, r) == (9, 11) { Some(IDENTITY) } else { tensors[r * 20 + c] };
+        let plain = exactly(field(20, 20, at), DVec2::new(9.0, 11.0));
+        let turned = |d: Sym2| Sym2::new(d.yy, d.xy, d.xx);
+        let swapped = exactly(field(20, 20, |c, r| at(r, c).map(turned)), DVec2::new(11.0, 9.0));
+        let flipped = |d: Sym2| Sym2::new(d.xx, -d.xy, d.yy);
+        let mirrored = exactly(field(20, 20, |c, r| at(19 - c, r).map(flipped)), DVec2::new(10.0, 11.0));
+        for row in 0..20 {
+            for col in 0..20 {
+                let g = plain.at_node(col, row);
+                for other in [swapped.at_node(row, col), mirrored.at_node(19 - col, row)] {
+                    prop_assert!(g == other || (g - other).abs() <= 1e-4 * g, "({col}, {row}): {g} {other}");
+                }
+            }
+        }
+    }
+}

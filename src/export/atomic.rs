@@ -1,0 +1,229 @@
+//! Files that appear whole or not at all: written beside their place, then renamed into it.
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use tempfile::NamedTempFile;
+
+use crate::{Error, Result};
+
+/// Where [`write_file`] lets its caller write; it can seek too.
+type Output = BufWriter<NamedTempFile>;
+
+/// Whether `path` may be written: call it before long work.
+///
+/// # Errors
+/// [`Error::Usage`] if the parent folder is missing, if something other than a file is in the way,
+/// or if the file exists and `overwrite` is false.
+pub fn check_free(path: impl AsRef<Path>, overwrite: bool) -> Result<()> {
+    let path = path.as_ref();
+    let parent = parent(path);
+    if !parent.is_dir() {
+        return Err(Error::usage(format!(
+            "cannot write {}: the folder {} does not exist; create it first",
+            path.display(),
+            parent.display()
+        )));
+    }
+    if !path.exists() {
+        Ok(())
+    } else if !path.is_file() {
+        Err(Error::usage(format!(
+            "cannot write {}: it exists and is not a regular file; give another name",
+            path.display()
+        )))
+    } else if !overwrite {
+        Err(Error::usage(format!("{} exists; give --overwrite to replace it", path.display())))
+    } else {
+        Ok(())
+    }
+}
+
+/// Whether files of these `names` may be written into `folder`, which may be missing but whose parent
+/// may not: call it before long work.
+///
+/// # Errors
+/// As [`check_free`] for each file; [`Error::Usage`] if `folder` is a file.
+pub fn check_folder_free(folder: impl AsRef<Path>, names: &[&str], overwrite: bool) -> Result<()> {
+    let folder = folder.as_ref();
+    if folder.is_dir() {
+        names.iter().try_for_each(|name| check_free(folder.join(name), overwrite))
+    } else if folder.exists() {
+        Err(Error::usage(format!("{} is a file; a folder is needed", folder.display())))
+    } else {
+        check_free(folder, overwrite)
+    }
+}
+
+/// Writes the file `path` by `write`. Readers see the old content or the new one, never a part:
+/// the content goes to a temporary file in the same folder, which is renamed at the end and removed
+/// if anything fails.
+///
+/// # Errors
+/// Those of [`check_free`]; [`Error::Io`] with `path` if `write` fails or the disk does.
+pub fn write_file(
+    path: impl AsRef<Path>,
+    overwrite: bool,
+    write: impl FnOnce(&mut Output) -> io::Result<()>,
+) -> Result<()> {
+    let path = path.as_ref();
+    check_free(path, overwrite)?;
+    // A link is followed, so that its target is replaced and not the link.
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let put = || -> io::Result<()> {
+        let mut out = BufWriter::new(temporary_file(parent(&place))?);
+        write(&mut out)?;
+        out.flush()?;
+        let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+        if overwrite { file.persist(&place) } else { file.persist_noclobber(&place) }
+            .map(drop)
+            .map_err(|e| e.error)
+    };
+    put().map_err(|e| Error::io(path, e))
+}
+
+/// Fills the folder `path` by `fill`, which is given an empty temporary folder beside it. When
+/// `fill` has succeeded, the new folder is renamed into place; if a folder is already there, each
+/// file produced is moved into it, and files of other names stay as they are.
+///
+/// # Errors
+/// [`Error::Usage`] if the parent is missing, `path` is no folder, or a file to be placed exists and
+/// `overwrite` is false (nothing is changed then); those of `fill`; [`Error::Io`].
+pub fn write_folder(
+    path: impl AsRef<Path>,
+    overwrite: bool,
+    fill: impl FnOnce(&Path) -> Result<()>,
+) -> Result<()> {
+    let path = path.as_ref();
+    check_folder_free(path, &[], overwrite)?;
+    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let temporary = tempfile::Builder::new()
+        .prefix(".ridgeway-")
+        .tempdir_in(parent(&place))
+        .map_err(|e| Error::io(path, e))?;
+    fill(temporary.path())?;
+    if place.exists() {
+        move_files(temporary.path(), &place, overwrite)
+    } else {
+        fs::rename(temporary.keep(), &place).map_err(|e| Error::io(path, e))
+    }
+}
+
+/// Moves the files of `from` into `to`, after checking that each may go there.
+fn move_files(from: &Path, to: &Path, overwrite: bool) -> Result<()> {
+    let names = fs::read_dir(from)
+        .and_then(|entries| entries.map(|e| Ok(e?.file_name())).collect::<io::Result<Vec<_>>>())
+        .map_err(|e| Error::io(from, e))?;
+    for name in &names {
+        check_free(to.join(name), overwrite)?;
+    }
+    for name in &names {
+        fs::rename(from.join(name), to.join(name)).map_err(|e| Error::io(to.join(name), e))?;
+    }
+    Ok(())
+}
+
+/// The folder that holds `path`.
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A temporary file with the permissions an ordinary new file has (a temporary file is private
+/// otherwise, and stays so when renamed).
+fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".ridgeway-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+
+    fn entries(folder: &Path) -> Vec<PathBuf> {
+        let mut all: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into()).collect();
+        all.sort();
+        all
+    }
+
+    #[test]
+    fn a_file_is_replaced_only_on_request() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_file(&path, false, |out| out.write_all(b"one")).unwrap();
+        let error = write_file(&path, false, |out| out.write_all(b"two")).unwrap_err();
+        assert!(error.to_string().ends_with("a.txt exists; give --overwrite to replace it"));
+        assert_eq!(fs::read(&path).unwrap(), b"one");
+        write_file(&path, true, |out| out.write_all(b"two")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"two");
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_file(&path, false, |out| out.write_all(b"one")).unwrap();
+        let failed = write_file(&path, true, |out| {
+            out.write_all(b"half")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("a.txt: disk full"));
+        assert_eq!(fs::read(&path).unwrap(), b"one");
+        assert_eq!(entries(folder.path()), [PathBuf::from("a.txt")]);
+    }
+
+    #[test]
+    fn a_missing_folder_and_a_folder_in_the_way_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = write_file(folder.path().join("no/a.txt"), false, |_| Ok(())).unwrap_err();
+        assert!(missing.to_string().contains("does not exist"), "{missing}");
+        let taken = write_file(folder.path(), true, |_| Ok(())).unwrap_err();
+        assert!(taken.to_string().contains("not a regular file"), "{taken}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_the_file_as_the_umask_says() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("plain"), "").unwrap();
+        write_file(folder.path().join("ours"), false, |_| Ok(())).unwrap();
+        let mode = |name| fs::metadata(folder.path().join(name)).unwrap().permissions().mode();
+        assert_eq!(mode("ours"), mode("plain"));
+    }
+
+    #[test]
+    fn a_folder_keeps_foreign_files_and_is_all_or_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let fill = |text: &'static str| {
+            move |dir: &Path| -> Result<()> {
+                fs::write(dir.join("b.txt"), text).unwrap();
+                fs::write(dir.join("c.txt"), text).unwrap();
+                Ok(())
+            }
+        };
+        write_folder(&out, false, fill("one")).unwrap();
+        fs::write(out.join("foreign"), "mine").unwrap();
+        fs::remove_file(out.join("c.txt")).unwrap();
+        assert!(check_folder_free(&out, &["c.txt"], false).is_ok());
+        assert!(check_folder_free(&out, &["b.txt", "c.txt"], false).is_err());
+        assert!(check_folder_free(out.join("b.txt"), &[], true).is_err());
+        assert!(write_folder(&out, false, fill("two")).is_err());
+        assert_eq!(entries(&out), [PathBuf::from("b.txt"), PathBuf::from("foreign")]);
+        assert!(write_folder(&out, true, |_| Err(Error::Cancelled)).is_err());
+        write_folder(&out, true, fill("two")).unwrap();
+        assert_eq!(fs::read(out.join("c.txt")).unwrap(), b"two");
+        assert_eq!(fs::read(out.join("foreign")).unwrap(), b"mine");
+        assert_eq!(entries(folder.path()), [PathBuf::from("out")]);
+    }
+}

@@ -1,0 +1,439 @@
+//! Rasters as GeoTIFF: tiled, Deflate with a predictor, georeferenced.
+//!
+//! The `tiff` crate writes header and directory; it has no tiles and no floating-point predictor, so
+//! the tiles are made here. BigTIFF is used where the classic format's 4 GB could be exceeded.
+
+use std::io::{self, Seek, Write};
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use glam::DVec2;
+use rayon::prelude::*;
+use tiff::encoder::{DirectoryEncoder, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
+use tiff::tags::{
+    CompressionMethod, PhotometricInterpretation, PlanarConfiguration, SampleFormat, Tag,
+};
+use tiff::{TiffError, TiffResult};
+
+use crate::GridFrame;
+
+/// Side of a tile in pixels, GDAL's default.
+const TILE: usize = 256;
+/// Deflate level: on float terrain a higher one costs several times the time for 1 or 2 % of size.
+const LEVEL: u32 = 3;
+/// Most bytes of samples in a classic TIFF. Its limit is 4 GB; the rest is room for the padding of
+/// edge tiles and for data that Deflate cannot shorten.
+const CLASSIC_BYTES: usize = 3 << 30;
+/// `GTRasterTypeGeoKey`: 1 where pixels are areas, 2 where they are points.
+const RASTER_TYPE: u16 = 1025;
+/// The keys of a vertical CRS.
+const VERTICAL_KEYS: std::ops::RangeInclusive<u16> = 4096..=4099;
+/// `GDAL_METADATA`, TIFF tag 42112: an XML text that GDAL-based programs read band names from.
+const GDAL_METADATA: Tag = Tag::Unknown(42112);
+
+/// One band of a raster.
+#[derive(Clone, Debug)]
+pub struct Band<'a> {
+    /// What the values are, with their unit: `distance (m)`.
+    pub description: &'a str,
+    /// The values, row-major from the north-west. All bands of a file have the same type.
+    pub samples: Samples<'a>,
+}
+
+/// The values of a band.
+#[derive(Clone, Copy, Debug)]
+pub enum Samples<'a> {
+    /// Measures; `NaN` is nodata. Infinite values are written as `NaN`.
+    F32(&'a [f32]),
+    /// Labels; 0 is nodata.
+    U32(&'a [u32]),
+    /// Classes; 0 is nodata.
+    U8(&'a [u8]),
+}
+
+/// The GeoTIFF keys of a CRS; empty for none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GeoKeys {
+    /// `GeoKeyDirectoryTag`.
+    pub directory: Vec<u16>,
+    /// `GeoDoubleParamsTag`.
+    pub doubles: Vec<f64>,
+    /// `GeoAsciiParamsTag`.
+    pub ascii: String,
+}
+
+impl GeoKeys {
+    /// The keys that name an EPSG code (OGC GeoTIFF 1.1, sections 7.4 and 7.5). A code beyond 16 bits
+    /// cannot be named and gives no keys.
+    #[must_use]
+    pub fn from_epsg(code: u32, geographic: bool) -> Self {
+        // GTModelType: 1 projected, 2 geographic; then the key that holds the code.
+        let (model, key) = if geographic { (2, 2048) } else { (1, 3072) };
+        let directory = u16::try_from(code).map_or_else(
+            |_| Vec::new(),
+            |code| vec![1, 1, 0, 3, 1024, 0, 1, model, RASTER_TYPE, 0, 1, 1, key, 0, 1, code],
+        );
+        Self { directory, ..Self::default() }
+    }
+
+    /// The directory as it is right for our files: pixels are areas, whatever the file was that the
+    /// keys come from, and nothing is said of heights, which are in metres here.
+    fn directory(&self) -> Vec<u16> {
+        let Some((header, keys)) = self.directory.split_at_checked(4) else { return Vec::new() };
+        let mut kept: Vec<[u16; 4]> = keys
+            .chunks_exact(4)
+            .filter(|key| key[0] != RASTER_TYPE && !VERTICAL_KEYS.contains(&key[0]))
+            .map(|key| [key[0], key[1], key[2], key[3]])
+            .chain([[RASTER_TYPE, 0, 1, 1]])
+            .collect();
+        kept.sort_unstable(); // keys must ascend
+        let count = u16::try_from(kept.len()).unwrap_or(u16::MAX);
+        [&header[..3], &[count], &kept.concat()].concat()
+    }
+}
+
+impl Samples<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::U32(v) => v.len(),
+            Self::U8(v) => v.len(),
+        }
+    }
+
+    fn bytes_per_sample(&self) -> usize {
+        match self {
+            Self::F32(_) | Self::U32(_) => 4,
+            Self::U8(_) => 1,
+        }
+    }
+
+    fn format(&self) -> SampleFormat {
+        match self {
+            Self::F32(_) => SampleFormat::IEEEFP,
+            Self::U32(_) | Self::U8(_) => SampleFormat::Uint,
+        }
+    }
+
+    /// TIFF's predictor: 2 horizontal differences, 3 the floating-point one.
+    fn predictor(&self) -> u16 {
+        if matches!(self, Self::F32(_)) { 3 } else { 2 }
+    }
+
+    fn nodata(&self) -> &'static str {
+        if matches!(self, Self::F32(_)) { "nan" } else { "0" }
+    }
+}
+
+/// Writes `bands` on `frame` as one GeoTIFF, bands in separate planes.
+///
+/// # Errors
+/// Those of `out`; `InvalidInput` if there is no band, bands differ in type, a band has not one value
+/// per node, or the grid exceeds TIFF's 32-bit sizes.
+pub fn write_geotiff(
+    out: impl Write + Seek,
+    frame: &GridFrame,
+    keys: &GeoKeys,
+    bands: &[Band<'_>],
+) -> io::Result<()> {
+    check(frame, bands).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
+    let bytes: usize = bands.iter().map(|b| b.samples.len() * b.samples.bytes_per_sample()).sum();
+    let written = if bytes > CLASSIC_BYTES {
+        write::<_, TiffKindBig>(out, frame, keys, bands)
+    } else {
+        write::<_, TiffKindStandard>(out, frame, keys, bands)
+    };
+    written.map_err(|e| match e {
+        TiffError::IoError(e) => e,
+        other => io::Error::other(other),
+    })
+}
+
+fn check(frame: &GridFrame, bands: &[Band<'_>]) -> Result<(), String> {
+    let Some(first) = bands.first() else { return Err("a raster needs at least one band".into()) };
+    if u32::try_from(frame.cols().max(frame.rows())).is_err() || u16::try_from(bands.len()).is_err()
+    {
+        return Err("the raster has too many columns, rows or bands for TIFF".into());
+    }
+    for band in bands {
+        if band.samples.len() != frame.nodes() {
+            return Err(format!(
+                "band \"{}\" has {} values for a grid of {} × {}",
+                band.description,
+                band.samples.len(),
+                frame.cols(),
+                frame.rows()
+            ));
+        }
+        if std::mem::discriminant(&band.samples) != std::mem::discriminant(&first.samples) {
+            return Err("the bands of a raster must have the same sample type".into());
+        }
+    }
+    Ok(())
+}
+
+fn write<W: Write + Seek, K: TiffKind>(
+    out: W,
+    frame: &GridFrame,
+    keys: &GeoKeys,
+    bands: &[Band<'_>],
+) -> TiffResult<()> {
+    let mut tiff = TiffEncoder::<_, K>::new_generic(out)?;
+    let mut directory = tiff.image_directory()?;
+    write_layout(&mut directory, frame, bands)?;
+    write_place(&mut directory, frame, keys)?;
+    write_names(&mut directory, bands)?;
+    write_tiles(&mut directory, frame, bands)?;
+    directory.finish()
+}
+
+/// Size, sample type, compression.
+fn write_layout<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    frame: &GridFrame,
+    bands: &[Band<'_>],
+) -> TiffResult<()> {
+    let samples = bands[0].samples;
+    let per_band = |value: u16| vec![value; bands.len()];
+    directory.write_tag(Tag::ImageWidth, u32::try_from(frame.cols())?)?;
+    directory.write_tag(Tag::ImageLength, u32::try_from(frame.rows())?)?;
+    directory
+        .write_tag(Tag::BitsPerSample, &per_band(8 * samples.bytes_per_sample() as u16)[..])?;
+    directory.write_tag(Tag::SampleFormat, &per_band(samples.format().to_u16())[..])?;
+    directory.write_tag(Tag::SamplesPerPixel, u16::try_from(bands.len())?)?;
+    directory.write_tag(Tag::PhotometricInterpretation, PhotometricInterpretation::BlackIsZero)?;
+    if bands.len() > 1 {
+        directory.write_tag(Tag::ExtraSamples, &per_band(0)[1..])?;
+    }
+    directory.write_tag(Tag::PlanarConfiguration, PlanarConfiguration::Planar)?;
+    directory.write_tag(Tag::Compression, CompressionMethod::Deflate)?;
+    directory.write_tag(Tag::Predictor, samples.predictor())?;
+    directory.write_tag(Tag::TileWidth, TILE as u32)?;
+    directory.write_tag(Tag::TileLength, TILE as u32)
+}
+
+/// Position on the map and CRS.
+fn write_place<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    frame: &GridFrame,
+    keys: &GeoKeys,
+) -> TiffResult<()> {
+    let step = frame.step();
+    // The tie point is the north-west corner of the first pixel; the frame's origin is its centre.
+    let corner = frame.to_map(DVec2::splat(-0.5));
+    directory.write_tag(Tag::ModelPixelScaleTag, [step.x, step.y, 0.0])?;
+    directory.write_tag(Tag::ModelTiepointTag, [0.0, 0.0, 0.0, corner.x, corner.y, 0.0])?;
+    let keyed = keys.directory();
+    if !keyed.is_empty() {
+        directory.write_tag(Tag::GeoKeyDirectoryTag, &keyed[..])?;
+        if !keys.doubles.is_empty() {
+            directory.write_tag(Tag::GeoDoubleParamsTag, &keys.doubles[..])?;
+        }
+        if !keys.ascii.is_empty() {
+            directory.write_tag(Tag::GeoAsciiParamsTag, &keys.ascii[..])?;
+        }
+    }
+    Ok(())
+}
+
+/// Nodata, the names of the bands, the software.
+fn write_names<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    bands: &[Band<'_>],
+) -> TiffResult<()> {
+    let mut xml = String::from("<GDALMetadata>\n");
+    for (i, band) in bands.iter().enumerate() {
+        let name = ascii_xml(band.description);
+        xml += &format!(
+            "  <Item name=\"DESCRIPTION\" sample=\"{i}\" role=\"description\">{name}</Item>\n"
+        );
+    }
+    xml += "</GDALMetadata>\n";
+    directory.write_tag(GDAL_METADATA, &xml[..])?;
+    directory.write_tag(Tag::GdalNodata, bands[0].samples.nodata())?;
+    directory.write_tag(Tag::Software, concat!("ridgeway ", env!("CARGO_PKG_VERSION")))
+}
+
+/// XML text in ASCII, the only encoding TIFF's texts have.
+fn ascii_xml(text: &str) -> String {
+    text.chars()
+        .map(|c| match c {
+            '<' | '>' | '&' | '"' => format!("&#{};", c as u32),
+            c if c.is_ascii() && !c.is_ascii_control() => c.to_string(),
+            c => format!("&#{};", c as u32),
+        })
+        .collect()
+}
+
+/// The tiles of each band from the north-west, row by row, and where they lie in the file.
+fn write_tiles<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<'_, W, K>,
+    frame: &GridFrame,
+    bands: &[Band<'_>],
+) -> TiffResult<()> {
+    let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
+    for band in bands {
+        for row in (0..frame.rows()).step_by(TILE) {
+            // Compressed in parallel a row of tiles at a time, which bounds the memory.
+            let tiles = (0..frame.cols().div_ceil(TILE))
+                .into_par_iter()
+                .map(|tile| compress(&filtered(frame, band.samples, tile * TILE, row)))
+                .collect::<io::Result<Vec<_>>>()?;
+            for tile in &tiles {
+                let offset = directory.write_data(&tile[..])?;
+                offsets.push(K::convert_offset(offset)?);
+                sizes.push(K::convert_offset(tile.len() as u64)?);
+            }
+        }
+    }
+    directory.write_tag(Tag::TileOffsets, K::convert_slice(&offsets))?;
+    directory.write_tag(Tag::TileByteCounts, K::convert_slice(&sizes))
+}
+
+/// The bytes of the tile whose first pixel is `(col, row)`, after the predictor; zero beyond the edge.
+fn filtered(frame: &GridFrame, samples: Samples<'_>, col: usize, row: usize) -> Vec<u8> {
+    let mut tile = Vec::with_capacity(TILE * TILE * samples.bytes_per_sample());
+    let width = TILE.min(frame.cols() - col);
+    for row in row..row + TILE {
+        let start = frame.index(col, row.min(frame.rows() - 1));
+        let line = if row < frame.rows() { start..start + width } else { 0..0 };
+        match samples {
+            Samples::F32(values) => float_differences(&values[line], &mut tile),
+            Samples::U32(values) => {
+                let mut left = 0u32;
+                for here in padded(&values[line]) {
+                    tile.extend(here.wrapping_sub(left).to_ne_bytes());
+                    left = here;
+                }
+            }
+            Samples::U8(values) => {
+                let mut left = 0u8;
+                for here in padded(&values[line]) {
+                    tile.push(here.wrapping_sub(left));
+                    left = here;
+                }
+            }
+        }
+    }
+    tile
+}
+
+/// One line of a tile: the values, then zeros.
+fn padded<T: Copy + Default>(values: &[T]) -> impl Iterator<Item = T> {
+    values.iter().copied().chain(std::iter::repeat(T::default())).take(TILE)
+}
+
+/// TIFF's predictor 3 (Adobe Photoshop TIFF Technical Note 3): the most significant bytes of the
+/// line, then the second ones, and so on; then differences of successive bytes.
+fn float_differences(values: &[f32], out: &mut Vec<u8>) {
+    let start = out.len();
+    out.resize(start + 4 * TILE, 0);
+    let line = &mut out[start..];
+    for (i, value) in padded(values).enumerate() {
+        let value = if value.is_finite() { value } else { f32::NAN };
+        for (plane, byte) in value.to_be_bytes().into_iter().enumerate() {
+            line[plane * TILE + i] = byte;
+        }
+    }
+    for i in (1..line.len()).rev() {
+        line[i] = line[i].wrapping_sub(line[i - 1]);
+    }
+}
+
+fn compress(bytes: &[u8]) -> io::Result<Vec<u8>> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(LEVEL));
+    encoder.write_all(bytes)?;
+    encoder.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use tiff::decoder::{Decoder, DecodingResult};
+
+    use super::*;
+    use crate::Ground;
+
+    fn frame(cols: usize, rows: usize) -> GridFrame {
+        let origin = DVec2::new(400_015.0, 4_599_985.0);
+        GridFrame::new(cols, rows, origin, DVec2::splat(30.0), Ground::METRES).unwrap()
+    }
+
+    fn written(frame: &GridFrame, bands: &[Band<'_>]) -> Vec<u8> {
+        let mut out = Cursor::new(Vec::new());
+        write_geotiff(&mut out, frame, &GeoKeys::from_epsg(32631, false), bands).unwrap();
+        out.into_inner()
+    }
+
+    #[test]
+    fn floats_read_back_with_their_place() {
+        let frame = frame(300, 270);
+        let mut values: Vec<f32> = (0..frame.nodes()).map(|i| (i as f32).sin() * 1e3).collect();
+        values[5] = f32::INFINITY;
+        let band = Band { description: "distance (m) of <κ>", samples: Samples::F32(&values) };
+        let bytes = written(&frame, &[band]);
+        let mut tiff = Decoder::new(Cursor::new(&bytes)).unwrap();
+        assert_eq!(tiff.dimensions().unwrap(), (300, 270));
+        let tiepoint = tiff.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap();
+        assert_eq!(tiepoint, [0.0, 0.0, 0.0, 400_000.0, 4_600_000.0, 0.0]);
+        assert_eq!(tiff.get_tag_f64_vec(Tag::ModelPixelScaleTag).unwrap(), [30.0, 30.0, 0.0]);
+        assert_eq!(tiff.get_tag_ascii_string(Tag::GdalNodata).unwrap(), "nan");
+        let xml = tiff.get_tag_ascii_string(GDAL_METADATA).unwrap();
+        assert!(xml.contains("distance (m) of &#60;&#954;&#62;"), "{xml}");
+        let DecodingResult::F32(read) = tiff.read_image().unwrap() else { panic!("floats") };
+        for (i, (a, b)) in read.iter().zip(&values).enumerate() {
+            assert!(a == b || (i == 5 && a.is_nan()), "{a} for {b} at {i}");
+        }
+    }
+
+    #[test]
+    fn labels_read_back() {
+        let frame = frame(257, 3);
+        let labels: Vec<u32> =
+            (0..frame.nodes() as u32).map(|i| i.wrapping_mul(2_654_435_769)).collect();
+        let band = Band { description: "region", samples: Samples::U32(&labels) };
+        let bytes = written(&frame, &[band]);
+        let read = Decoder::new(Cursor::new(&bytes)).unwrap().read_image().unwrap();
+        assert!(matches!(read, DecodingResult::U32(read) if read == labels));
+    }
+
+    #[test]
+    fn big_tiff_and_threads_change_no_value() {
+        let frame = frame(600, 2);
+        let classes: Vec<u8> = (0..frame.nodes()).map(|i| (i * i) as u8).collect();
+        let bands = [Band { description: "class", samples: Samples::U8(&classes) }];
+        let mut out = Cursor::new(Vec::new());
+        write::<_, TiffKindBig>(&mut out, &frame, &GeoKeys::default(), &bands).unwrap();
+        let read = Decoder::new(Cursor::new(out.into_inner())).unwrap().read_image().unwrap();
+        assert!(matches!(read, DecodingResult::U8(read) if read == classes));
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(one.install(|| written(&frame, &bands)), written(&frame, &bands));
+    }
+
+    #[test]
+    fn keys_of_a_file_are_kept_but_for_pixel_kind_and_heights() {
+        let keys = GeoKeys {
+            directory: vec![
+                1, 1, 1, 4, 1024, 0, 1, 1, 1025, 0, 1, 2, 3072, 0, 1, 32631, 4099, 0, 1, 9002,
+            ],
+            ..GeoKeys::default()
+        };
+        assert_eq!(keys.directory(), [1, 1, 1, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32631]);
+        assert!(GeoKeys::default().directory().is_empty());
+        assert!(GeoKeys::from_epsg(100_000, false).directory().is_empty());
+    }
+
+    #[test]
+    fn wrong_bands_are_refused() {
+        let write = |bands: &[Band<'_>]| {
+            write_geotiff(Cursor::new(Vec::new()), &frame(2, 2), &GeoKeys::default(), bands)
+        };
+        let (floats, bytes) = ([0f32; 4], [0u8; 4]);
+        let band = |samples| Band { description: "", samples };
+        assert!(write(&[]).is_err());
+        assert!(write(&[band(Samples::F32(&floats[1..]))]).is_err());
+        assert!(write(&[band(Samples::F32(&floats)), band(Samples::U8(&bytes))]).is_err());
+        assert!(write(&[band(Samples::U8(&bytes))]).is_ok());
+    }
+}

@@ -1,0 +1,173 @@
+//! A sheet of pixels with the few shapes that our pictures need.
+
+use glam::Vec2;
+use rayon::prelude::*;
+use tiny_skia::{
+    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, Transform,
+};
+
+use super::text;
+use crate::{Error, Result};
+
+/// An opaque colour: red, green, blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rgb(pub u8, pub u8, pub u8);
+
+impl Rgb {
+    /// Blue, for the isotropic metric. With [`ORANGE`](Self::ORANGE) it can be told apart with any
+    /// kind of colour vision.
+    pub const BLUE: Self = Self(0x1a, 0x6f, 0xdf);
+    /// Red-orange, for the curvature metric.
+    pub const ORANGE: Self = Self(0xd7, 0x30, 0x1f);
+    /// Green, for starts (with the letter S).
+    pub const GREEN: Self = Self(0x1b, 0x78, 0x37);
+    /// Purple, for goals (with the letter G).
+    pub const PURPLE: Self = Self(0x76, 0x2a, 0x83);
+    /// Near black, for text.
+    pub const INK: Self = Self(0x22, 0x22, 0x22);
+    /// White.
+    pub const WHITE: Self = Self(0xff, 0xff, 0xff);
+
+    /// This colour at `share` 0, `other` at 1.
+    pub(super) fn mix(self, other: Self, share: f64) -> Self {
+        let share = share.clamp(0.0, 1.0);
+        let mix =
+            |a: u8, b: u8| (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8;
+        Self(mix(self.0, other.0), mix(self.1, other.1), mix(self.2, other.2))
+    }
+}
+
+/// Lines with vertices closer than this, in pixels, are thinned: nobody can see more.
+const FINEST: f32 = 0.4;
+
+/// An opaque raster to draw on, white at first. Pixel coordinates run right and down.
+pub(super) struct Canvas {
+    pixels: Pixmap,
+}
+
+impl Canvas {
+    pub(super) fn new(width: u32, height: u32) -> Result<Self> {
+        let mut pixels = Pixmap::new(width, height).ok_or_else(|| {
+            Error::usage(format!("a picture of {width} × {height} pixels is not possible"))
+        })?;
+        pixels.fill(Color::WHITE);
+        Ok(Self { pixels })
+    }
+
+    pub(super) fn into_pixmap(self) -> Pixmap {
+        self.pixels
+    }
+
+    /// Sets each pixel of a rectangle to `colour(x, y)`, counted from its corner at `left`, `top`.
+    pub(super) fn paint(
+        &mut self,
+        [left, top, width, height]: [usize; 4],
+        colour: impl Fn(usize, usize) -> Rgb + Sync,
+    ) {
+        let stride = 4 * self.pixels.width() as usize;
+        let rows = self.pixels.data_mut().par_chunks_exact_mut(stride).skip(top).take(height);
+        rows.enumerate().for_each(|(y, row)| {
+            for (x, pixel) in row.chunks_exact_mut(4).skip(left).take(width).enumerate() {
+                let Rgb(r, g, b) = colour(x, y);
+                pixel.copy_from_slice(&[r, g, b, 255]);
+            }
+        });
+    }
+
+    /// Fills a polygon.
+    pub(super) fn polygon(&mut self, points: &[Vec2], colour: Rgb) {
+        if let Some(path) = polyline_path(points, true) {
+            self.fill(&path, colour);
+        }
+    }
+
+    /// Draws polylines, `opacity` between 0 and 1; a line that ends where it began is closed.
+    pub(super) fn lines(&mut self, lines: &[Vec<Vec2>], width: f32, colour: Rgb, opacity: f32) {
+        let mut all = PathBuilder::new();
+        for line in lines {
+            let closed = line.len() > 2 && line.first() == line.last();
+            if let Some(path) = polyline_path(line, closed) {
+                all.push_path(&path);
+            }
+        }
+        if let Some(path) = all.finish() {
+            self.stroke(&path, width, colour, opacity);
+        }
+    }
+
+    /// A filled circle with a white rim.
+    pub(super) fn disc(&mut self, centre: Vec2, radius: f32, rim: f32, colour: Rgb) {
+        for (radius, colour) in [(radius + rim, Rgb::WHITE), (radius, colour)] {
+            if let Some(path) = PathBuilder::from_circle(centre.x, centre.y, radius) {
+                self.fill(&path, colour);
+            }
+        }
+    }
+
+    /// Text whose baseline begins at `at`; a white halo of `halo` pixels makes it legible on a map.
+    pub(super) fn text(&mut self, text: &str, size: f32, at: Vec2, colour: Rgb, halo: f32) {
+        if let Some(path) = text::outline(text, size, at) {
+            if halo > 0.0 {
+                self.stroke(&path, 2.0 * halo, Rgb::WHITE, 0.85);
+            }
+            self.fill(&path, colour);
+        }
+    }
+
+    fn fill(&mut self, path: &Path, colour: Rgb) {
+        let paint = paint(colour, 1.0);
+        self.pixels.fill_path(path, &paint, FillRule::Winding, Transform::identity(), None);
+    }
+
+    fn stroke(&mut self, path: &Path, width: f32, colour: Rgb, opacity: f32) {
+        let stroke = Stroke {
+            width,
+            line_cap: LineCap::Round,
+            line_join: LineJoin::Round,
+            ..Stroke::default()
+        };
+        let paint = paint(colour, opacity);
+        self.pixels.stroke_path(path, &paint, &stroke, Transform::identity(), None);
+    }
+}
+
+fn paint(Rgb(r, g, b): Rgb, opacity: f32) -> Paint<'static> {
+    let mut paint = Paint { anti_alias: true, ..Paint::default() };
+    paint.set_color_rgba8(r, g, b, (opacity.clamp(0.0, 1.0) * 255.0).round() as u8);
+    paint
+}
+
+fn polyline_path(points: &[Vec2], closed: bool) -> Option<Path> {
+    let (&first, rest) = points.split_first()?;
+    let mut path = PathBuilder::with_capacity(points.len(), points.len());
+    path.move_to(first.x, first.y);
+    let mut drawn = first;
+    for (i, &p) in rest.iter().enumerate() {
+        if p.distance(drawn) >= FINEST || i + 1 == rest.len() {
+            path.line_to(p.x, p.y);
+            drawn = p;
+        }
+    }
+    if closed {
+        path.close();
+    }
+    path.finish()
+}
+
+/// The opaque picture as PNG, 8 bits per channel without alpha.
+pub(super) fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
+    let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    encoder
+        .write_header()
+        .and_then(|mut writer| {
+            writer.write_image_data(&rgb)?;
+            writer.finish()
+        })
+        .map_err(|e| Error::usage(format!("the picture cannot be encoded as PNG: {e}")))?;
+    Ok(out)
+}

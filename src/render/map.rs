@@ -1,0 +1,312 @@
+//! A map: shaded terrain, isolines, routes, start and goal.
+
+use glam::{DVec2, Vec2};
+use tiny_skia::Pixmap;
+
+use super::canvas::{self, Rgb};
+use super::relief::Relief;
+use super::sheet::{Item, SIDE, Sheet};
+use super::text;
+use crate::export::Isoline;
+use crate::{Error, GridFrame, Result};
+
+/// Every so many isolines one is thick and labelled.
+const MAJOR: usize = 5;
+/// Size of the labels of isolines, in pixels of a picture of the default size.
+const LABEL: f32 = 17.0;
+/// Barriers are drawn in this colour, mixed half and half with the ground.
+const BARRIER: Rgb = Rgb(0x20, 0x20, 0x28);
+
+/// Isolines of one distance.
+#[derive(Clone, Debug)]
+pub struct IsolineLayer<'a> {
+    /// The lines.
+    pub isolines: &'a [Isoline],
+    /// Their colour.
+    pub colour: Rgb,
+    /// What the legend says; empty for no entry.
+    pub label: String,
+}
+
+/// One route.
+#[derive(Clone, Debug)]
+pub struct RouteLayer<'a> {
+    /// Points in grid coordinates.
+    pub grid: &'a [DVec2],
+    /// Its colour.
+    pub colour: Rgb,
+    /// What the legend says: name, length, a number; empty for no entry.
+    pub label: String,
+}
+
+/// What a map shows. Make it by [`MapPicture::new`] and fill the layers.
+#[derive(Clone, Debug)]
+pub struct MapPicture<'a> {
+    /// The grid.
+    pub frame: &'a GridFrame,
+    /// Heights in metres, row-major; `NaN` where void.
+    pub heights: &'a [f64],
+    /// Nodes that cannot be entered, row-major; empty for none. Voids need not be named.
+    pub barriers: &'a [bool],
+    /// Isolines, drawn in this order.
+    pub isolines: Vec<IsolineLayer<'a>>,
+    /// Routes, drawn in this order, each thinner than the one before, so that all of them are seen
+    /// where they share the way.
+    pub routes: Vec<RouteLayer<'a>>,
+    /// Starts, in grid coordinates.
+    pub starts: Vec<DVec2>,
+    /// Goals, in grid coordinates.
+    pub goals: Vec<DVec2>,
+    /// The line above the map; empty for none.
+    pub title: String,
+    /// Pixels of the map's longer side. Default: 1600.
+    pub max_side_px: u32,
+}
+
+impl<'a> MapPicture<'a> {
+    /// A map of the terrain alone.
+    #[must_use]
+    pub fn new(frame: &'a GridFrame, heights: &'a [f64]) -> Self {
+        Self {
+            frame,
+            heights,
+            barriers: &[],
+            isolines: Vec::new(),
+            routes: Vec::new(),
+            starts: Vec::new(),
+            goals: Vec::new(),
+            title: String::new(),
+            max_side_px: SIDE,
+        }
+    }
+
+    /// Draws the map.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if heights or barriers are not one per node, or the size is out of bounds.
+    pub fn render(&self) -> Result<Pixmap> {
+        let nodes = self.frame.nodes();
+        if self.heights.len() != nodes || ![0, nodes].contains(&self.barriers.len()) {
+            return Err(Error::usage(format!(
+                "{} heights and {} barriers for a grid of {nodes} nodes",
+                self.heights.len(),
+                self.barriers.len()
+            )));
+        }
+        let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, self.legend())?;
+        self.draw_ground(&mut sheet);
+        let mut labels = Vec::new();
+        for layer in &self.isolines {
+            labels.extend(draw_isolines(&mut sheet, layer));
+        }
+        let on_top = self.routes.iter().flat_map(|r| r.grid).chain(&self.starts).chain(&self.goals);
+        let taken: Vec<_> = on_top.map(|&p| sheet.place(p)).collect();
+        draw_labels(&mut sheet, labels, &taken);
+        self.draw_routes(&mut sheet);
+        let pins = self.starts.iter().map(|&p| (p, 'S', Rgb::GREEN));
+        for (at, letter, colour) in pins.chain(self.goals.iter().map(|&p| (p, 'G', Rgb::PURPLE))) {
+            sheet.pin(at, letter, colour);
+        }
+        Ok(sheet.finish())
+    }
+
+    /// [`render`](Self::render) as a PNG file.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn png(&self) -> Result<Vec<u8>> {
+        canvas::png(&self.render()?)
+    }
+
+    fn legend(&self) -> Vec<Item> {
+        let mut items = Vec::new();
+        for (places, letter, colour, label) in
+            [(&self.starts, 'S', Rgb::GREEN, "start"), (&self.goals, 'G', Rgb::PURPLE, "goal")]
+        {
+            if !places.is_empty() {
+                items.push(Item::Pin { colour, letter, label: label.into() });
+            }
+        }
+        let line = |colour, cased, label: &String| {
+            (!label.is_empty()).then(|| Item::Line { colour, cased, label: label.clone() })
+        };
+        items.extend(self.routes.iter().filter_map(|r| line(r.colour, true, &r.label)));
+        items.extend(self.isolines.iter().filter_map(|l| line(l.colour, false, &l.label)));
+        if self.barriers.iter().zip(self.heights).any(|(&barrier, h)| barrier && h.is_finite()) {
+            let colour = Rgb(0xd8, 0xd2, 0xc0).mix(BARRIER, 0.5);
+            items.push(Item::Patch { colour: Some(colour), label: "barrier".into() });
+        }
+        if self.heights.iter().any(|h| !h.is_finite()) {
+            items.push(Item::Patch { colour: None, label: "no data".into() });
+        }
+        items
+    }
+
+    fn draw_ground(&self, sheet: &mut Sheet) {
+        let relief = Relief::new(self.frame, self.heights, self.max_side_px as usize);
+        sheet.ground(|grid| {
+            let colour = relief.at(grid)?;
+            let node = self.frame.clamp(grid).round();
+            let barrier = self.barriers.get(self.frame.index(node.x as usize, node.y as usize));
+            Some(if barrier == Some(&true) { colour.mix(BARRIER, 0.5) } else { colour })
+        });
+    }
+
+    fn draw_routes(&self, sheet: &mut Sheet) {
+        let lines: Vec<_> =
+            self.routes.iter().map(|route| sheet.lines(&[route.grid.to_vec()])).collect();
+        let width = |i: usize| (4.5 + 3.0 * (lines.len() - 1 - i).min(3) as f32) * sheet.unit;
+        let widths: Vec<_> = (0..lines.len()).map(width).collect();
+        let casing = 3.5 * sheet.unit;
+        for (line, width) in lines.iter().zip(&widths) {
+            sheet.canvas.lines(line, width + casing, Rgb::WHITE, 0.9);
+        }
+        for ((line, width), route) in lines.iter().zip(&widths).zip(&self.routes) {
+            sheet.canvas.lines(line, *width, route.colour, 1.0);
+        }
+    }
+}
+
+/// A value written on its isoline.
+struct Label {
+    middle: Vec2,
+    half: Vec2,
+    text: String,
+    colour: Rgb,
+}
+
+/// Thin lines, every fifth thicker; and where along each thick one its label may go, best first.
+fn draw_isolines(sheet: &mut Sheet, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>> {
+    let mut labels = Vec::new();
+    for (i, isoline) in layer.isolines.iter().enumerate() {
+        let lines = sheet.lines(&isoline.lines);
+        let major = (i + 1) % MAJOR == 0;
+        let (width, opacity) = if major { (2.2, 0.8) } else { (1.1, 0.6) };
+        sheet.canvas.lines(&lines, width * sheet.unit, layer.colour, opacity);
+        if major && let Some(longest) = lines.iter().max_by_key(|line| line.len()) {
+            labels.push(label_places(longest, &number(isoline.level), layer.colour, sheet.unit));
+        }
+    }
+    labels
+}
+
+fn label_places(line: &[Vec2], text: &str, colour: Rgb, unit: f32) -> Vec<Label> {
+    let size = LABEL * unit;
+    let half = Vec2::new(text::width(text, size) / 2.0 + 4.0 * unit, 0.6 * size);
+    [8, 4, 12, 6, 10, 2, 14, 5, 11, 3, 13]
+        .map(|sixteenths| line[line.len() * sixteenths / 16])
+        .map(|middle| Label { middle, half, text: text.to_owned(), colour })
+        .into()
+}
+
+/// Draws each label in its first place that is on the map and free of `taken` points and of other
+/// labels; a label without such a place is left out.
+fn draw_labels(sheet: &mut Sheet, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
+    let size = LABEL * sheet.unit;
+    let mut drawn: Vec<Label> = Vec::new();
+    for places in labels {
+        let free = |l: &Label| {
+            let apart = |p: Vec2, reach: Vec2| (p - l.middle).abs().cmpgt(l.half + reach).any();
+            sheet.shows(l.middle - l.half)
+                && sheet.shows(l.middle + l.half)
+                && taken.iter().all(|&p| apart(p, Vec2::splat(10.0 * sheet.unit)))
+                && drawn.iter().all(|d| apart(d.middle, d.half))
+        };
+        if let Some(label) = places.into_iter().find(free) {
+            let width = text::width(&label.text, size);
+            let baseline = label.middle + Vec2::new(-width / 2.0, 0.36 * size);
+            sheet.canvas.text(&label.text, size, baseline, label.colour, 3.0 * sheet.unit);
+            drawn.push(label);
+        }
+    }
+}
+
+/// A number with at most four significant digits and no trailing zeros.
+pub(super) fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    if !(-4..7).contains(&magnitude) {
+        return format!("{value:.2e}");
+    }
+    let decimals = (3 - magnitude).clamp(0, 9) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ground;
+
+    fn frame(cols: usize, rows: usize) -> GridFrame {
+        GridFrame::new(cols, rows, DVec2::ZERO, DVec2::splat(30.0), Ground::METRES).unwrap()
+    }
+
+    #[test]
+    fn odd_grids_make_pictures() {
+        for (cols, rows) in [(1, 1), (2, 300), (300, 2), (3, 3)] {
+            let frame = frame(cols, rows);
+            for height in [0.0, 1e30, f64::NAN] {
+                let heights = vec![height; cols * rows];
+                let mut map = MapPicture::new(&frame, &heights);
+                map.max_side_px = 300;
+                map.title = "a long title ".repeat(50);
+                map.starts = vec![DVec2::ZERO];
+                let picture = map.render().unwrap();
+                assert!(picture.width() < 700 && picture.height() < 700);
+                assert!(map.png().unwrap().starts_with(b"\x89PNG"));
+            }
+        }
+    }
+
+    #[test]
+    fn layers_are_where_they_belong() {
+        let frame = frame(100, 50);
+        let heights = vec![0.0; 5000];
+        let mut barriers = vec![false; 5000];
+        barriers[10 * 100 + 80] = true;
+        let way = [DVec2::new(10.0, 25.0), DVec2::new(90.0, 25.0)];
+        let mut map = MapPicture::new(&frame, &heights);
+        map.max_side_px = 1600;
+        map.barriers = &barriers;
+        map.routes = vec![RouteLayer { grid: &way, colour: Rgb::BLUE, label: "r".into() }];
+        map.starts = vec![way[0]];
+        map.goals = vec![way[1]];
+        let picture = map.render().unwrap();
+        let sheet = Sheet::new(&frame, "", 1600, []).unwrap();
+        let pixel = |grid: DVec2, off: f32| {
+            let at = sheet.place(grid);
+            let p = picture.pixel(at.x as u32, (at.y + off) as u32).unwrap();
+            Rgb(p.red(), p.green(), p.blue())
+        };
+        assert_eq!(pixel(DVec2::new(50.0, 25.0), 0.0), Rgb::BLUE);
+        assert_eq!(pixel(way[0], 11.5), Rgb::GREEN);
+        assert_eq!(pixel(way[1], 11.5), Rgb::PURPLE);
+        let ground = pixel(DVec2::new(50.0, 10.0), 0.0);
+        assert_eq!(pixel(DVec2::new(80.0, 10.0), 0.0), ground.mix(BARRIER, 0.5));
+        // Twice as wide as tall, as on the ground.
+        assert_eq!(
+            sheet.place(DVec2::new(99.5, 49.5)) - sheet.place(DVec2::splat(-0.5)),
+            Vec2::new(1600.0, 800.0)
+        );
+    }
+
+    #[test]
+    fn wrong_sizes_are_refused() {
+        let frame = frame(3, 3);
+        assert!(MapPicture::new(&frame, &[0.0; 8]).render().is_err());
+        let mut map = MapPicture::new(&frame, &[0.0; 9]);
+        map.max_side_px = 1 << 20;
+        assert!(map.render().is_err());
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(number(12_500.0), "12500");
+        assert_eq!(number(0.25), "0.25");
+        assert_eq!(number(-3.0), "-3");
+        assert_eq!(number(2.5e-7), "2.50e-7");
+    }
+}

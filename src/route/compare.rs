@@ -1,0 +1,52 @@
+//! Routes of several metrics between the same places, side by side.
+
+use glam::DVec2;
+
+use super::{Route, trace};
+use crate::{Control, DistanceMap, MetricField, Result, Solver, StartRegion};
+
+/// The routes of several metrics between the same places, and what each costs under each.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// One route per metric, in their order.
+    pub routes: Vec<Route>,
+    /// The distance that each route was traced on.
+    pub distances: Vec<DistanceMap>,
+    /// `costs[m][r]`: length of route `r` under metric `m`, in the unit of `m`.
+    pub costs: Vec<Vec<f64>>,
+}
+
+impl Comparison {
+    /// Solves every metric from `start` over the whole grid and traces its route to `goal` (grid coordinates).
+    ///
+    /// # Errors
+    /// [`Error::NoWay`](crate::Error::NoWay), and those of [`Solver::solve`].
+    pub fn between(
+        metrics: &[MetricField<'_>],
+        start: &StartRegion,
+        goal: DVec2,
+        control: &Control,
+    ) -> Result<Self> {
+        let distances: Vec<DistanceMap> = metrics
+            .iter()
+            .map(|metric| Solver::default().solve(metric, start, &[], control))
+            .collect::<Result<_>>()?;
+        let routes: Vec<Route> = metrics
+            .iter()
+            .zip(&distances)
+            .map(|(metric, distance)| trace(distance, metric, goal))
+            .collect::<Result<_>>()?;
+        let costs = metrics
+            .iter()
+            .map(|metric| routes.iter().map(|route| metric.length(&route.grid)).collect())
+            .collect();
+        Ok(Self { routes, distances, costs })
+    }
+
+    /// Cost of route `route` under metric `metric`, divided by the least cost of any of the routes under it.
+    #[must_use]
+    pub fn ratio(&self, metric: usize, route: usize) -> f64 {
+        let costs = &self.costs[metric];
+        costs[route] / costs.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+}

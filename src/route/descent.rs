@@ -1,0 +1,187 @@
+//! Descent on the distance: the line of a route.
+//!
+//! Away from walls the line follows the solver's own directions, interpolated between the nodes, with the midpoint
+//! rule; the deviation from the exact line is set by the error of the distance, not by the step. Where that does
+//! not descend, beside walls and on the cut locus, it goes through the cell's border to the best point there,
+//! by the same update as the solver; and where even that does not descend, from node to node, each to the point
+//! that gave it its value, which cannot fail.
+
+use glam::DVec2;
+
+use crate::DistanceMap;
+
+/// Step of the midpoint rule in cells. A half or a quarter, and fourth order, give the same lines.
+const STEP: f64 = 0.5;
+
+/// The line from the start region to `goal` in grid coordinates; `None` if the goal was not reached.
+pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
+    let mut value = distance.stored_at(goal)?;
+    let mut at = goal;
+    let mut line = vec![goal];
+    let home = loop {
+        if let Some(foot) = distance.straight_home(at, value) {
+            break foot;
+        }
+        let next = follow(distance, at, value)
+            .or_else(|| distance.descend_to_border(at, value))
+            .or_else(|| descend_to_node(distance, at));
+        match next {
+            Some((next, lower)) if lower < value => (at, value) = (next, lower),
+            _ => return None,
+        }
+        line.push(at);
+    };
+    if home != at || line.len() == 1 {
+        line.push(home);
+    }
+    line.reverse();
+    Some(line)
+}
+
+/// One step of the midpoint rule along the interpolated directions, if it stays clear of walls and descends.
+fn follow(distance: &DistanceMap, at: DVec2, value: f64) -> Option<(DVec2, f64)> {
+    let middle = at + 0.5 * STEP * direction(distance, at)?;
+    let next = at + STEP * direction(distance, middle)?;
+    clear_cell(distance, next)?;
+    let lower = distance.stored_at(next)?;
+    // At least a tenth of what the step should bring, so that steps cannot dwindle.
+    let expected = distance.field.metric_at(at)?.norm(next - at);
+    (lower <= value - 0.1 * expected).then_some((next, lower))
+}
+
+/// Unit vector of descent in grid coordinates, bilinear between the corners of the cell.
+fn direction(distance: &DistanceMap, at: DVec2) -> Option<DVec2> {
+    let (col, row) = clear_cell(distance, at)?;
+    let (u, v) = (at.x - col as f64, at.y - row as f64);
+    let mut sum = DVec2::ZERO;
+    for (i, j, weight) in
+        [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
+    {
+        if weight > 0.0 {
+            sum += weight * distance.foot(col + i, row + j)?.try_normalize()?;
+        }
+    }
+    sum.try_normalize()
+}
+
+/// The cell of a point, if the point is inside the grid and all corners that matter are reached.
+fn clear_cell(distance: &DistanceMap, at: DVec2) -> Option<(usize, usize)> {
+    let last = DVec2::new((distance.cols() - 1) as f64, (distance.rows() - 1) as f64);
+    if !(at.cmpge(DVec2::ZERO).all() && at.cmple(last).all()) {
+        return None;
+    }
+    let (col, row) = (at.x as usize, at.y as usize);
+    let (east, south) = (at.x > col as f64, at.y > row as f64);
+    let reached =
+        |i: bool, j: bool| distance.is_reached(col + usize::from(i), row + usize::from(j));
+    let clear = reached(false, false)
+        && (!east || reached(true, false))
+        && (!south || reached(false, true))
+        && (!(east && south) || reached(true, true));
+    clear.then_some((col, row))
+}
+
+/// From a node to the point its value came from; from elsewhere to the lowest corner in sight.
+fn descend_to_node(distance: &DistanceMap, at: DVec2) -> Option<(DVec2, f64)> {
+    if at == at.round() {
+        let next = at + distance.foot(at.x as usize, at.y as usize)?;
+        return Some((next, distance.stored_at(next)?));
+    }
+    distance.lowest_corner(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eikonal::TensorField;
+    use crate::{Control, Solver, Sym2};
+
+    fn solve(
+        n: usize,
+        start: DVec2,
+        tensor: impl Fn(usize, usize) -> Option<Sym2> + Sync,
+    ) -> DistanceMap {
+        let field = TensorField::from_fn(n, n, tensor, &Control::default()).unwrap();
+        Solver::default().solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+    }
+
+    fn check(distance: &DistanceMap, start: DVec2, goal: DVec2) -> Vec<DVec2> {
+        let line = line(distance, goal).unwrap();
+        assert_eq!((line[0], line[line.len() - 1]), (start, goal));
+        for ends in line.windows(2) {
+            let (a, b) =
+                (distance.stored_at(ends[0]).unwrap(), distance.stored_at(ends[1]).unwrap());
+            assert!(a < b, "{} {a} is not nearer than {} {b}", ends[0], ends[1]);
+            // One cell, except for the straight way home.
+            let longest = if ends[0] == start { 4.0 } else { 1.5 };
+            assert!(ends[0].distance(ends[1]) <= longest);
+        }
+        line
+    }
+
+    #[test]
+    fn lines_on_a_constant_tensor_are_straight() {
+        for ratio in [1.0, 4.0, 25.0] {
+            let (sin, cos) = 0.5f64.sin_cos();
+            let d = Sym2::outer(DVec2::new(cos, sin)) * ratio + Sym2::outer(DVec2::new(-sin, cos));
+            let start = DVec2::new(60.3, 59.6);
+            let distance = solve(121, start, |_, _| Some(d));
+            for k in 0..40 {
+                let goal = start + 55.0 * DVec2::from_angle(0.157 * f64::from(k));
+                let along = (goal - start).normalize();
+                let line = check(&distance, start, goal);
+                let stray =
+                    line.iter().map(|p| (*p - start).perp_dot(along).abs()).fold(0.0, f64::max);
+                assert!(stray < 1.5, "ratio {ratio}, goal {goal}: {stray} cells");
+            }
+        }
+    }
+
+    #[test]
+    fn lines_go_round_walls_without_touching_them() {
+        // Staggered walls with a gap at alternate ends; one of them is a bare diagonal of nodes.
+        let n = 60;
+        let wall = |c: usize, r: usize| {
+            (r == 15 && c < 50)
+                || (r == 30 && c > 10)
+                || (c + r == 90 && r > 34 && c > 34 && c < 56)
+        };
+        let start = DVec2::new(5.0, 3.0);
+        let distance = solve(n, start, |c, r| (!wall(c, r)).then_some(Sym2::new(1.0, 0.0, 1.0)));
+        for goal in [DVec2::new(40.2, 20.4), DVec2::new(20.5, 55.5), DVec2::new(50.7, 50.2)] {
+            let line = check(&distance, start, goal);
+            for ends in line.windows(2) {
+                assert!(crate::eikonal::sees(&distance.field, ends[0], ends[1]));
+            }
+        }
+    }
+
+    #[test]
+    fn lines_descend_on_rough_fields_of_any_anisotropy() {
+        let n = 80;
+        let random = |c: usize, r: usize, salt: u64| {
+            let mut x = (c as u64) << 32 ^ (r as u64) << 8 ^ salt;
+            for _ in 0..3 {
+                x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            }
+            (x >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let tensor = |c, r| {
+            let along = DVec2::from_angle(6.3 * random(c, r, 1));
+            let d = Sym2::outer(along) + Sym2::outer(along.perp()) * (0.01 + random(c, r, 2));
+            (random(c, r, 3) > 0.15).then_some(d)
+        };
+        let start = DVec2::new(40.0, 40.0);
+        let open = |c: usize, r: usize| {
+            if (c, r) == (40, 40) { Some(Sym2::new(1.0, 0.0, 1.0)) } else { tensor(c, r) }
+        };
+        let distance = solve(n, start, open);
+        for row in (0..n).step_by(3) {
+            for col in (0..n).step_by(3) {
+                if distance.is_reached(col, row) && (col, row) != (40, 40) {
+                    check(&distance, start, DVec2::new(col as f64, row as f64));
+                }
+            }
+        }
+    }
+}

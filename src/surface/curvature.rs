@@ -1,0 +1,184 @@
+//! Slope, normal and curvature of a height surface, from its derivatives at one point.
+//!
+//! All vectors are in ground axes, `x` east and `y` north. Curvature is positive where the surface bends
+//! towards its upward normal: in a hollow.
+
+use glam::{DVec2, DVec3};
+
+use super::HeightJet;
+
+/// Curvatures of a surface at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curvature {
+    /// Gaussian curvature `K = κ1 κ2`, 1/m².
+    pub gaussian: f64,
+    /// Mean curvature `H = (κ1 + κ2)/2`, 1/m.
+    pub mean: f64,
+    /// Principal curvatures `κ1 ≥ κ2`, 1/m.
+    pub principal: [f64; 2],
+    /// Principal directions `w1, w2` in ground axes, `w_iᵀ G w_j = δ_ij`: plan views of orthogonal unit
+    /// tangents. Their signs are arbitrary, and at an umbilic so is the pair.
+    pub directions: [DVec2; 2],
+}
+
+impl HeightJet {
+    /// Gradient `∇z`: points uphill, its length is the tangent of the slope.
+    #[must_use]
+    pub fn gradient(&self) -> DVec2 {
+        DVec2::new(self.zx, self.zy)
+    }
+
+    /// Angle in radians between surface and horizontal, 0 to π/2.
+    #[must_use]
+    pub fn slope(&self) -> f64 {
+        self.gradient().length().atan()
+    }
+
+    /// Upward unit normal `(−zx, −zy, 1)/√(1+|∇z|²)`.
+    #[must_use]
+    pub fn normal(&self) -> DVec3 {
+        DVec3::new(-self.zx, -self.zy, 1.0) / self.stretch()
+    }
+
+    /// First fundamental form `G = I + ∇z ∇zᵀ` as `[G11, G12, G22]`: `√(vᵀGv)` is the length on the
+    /// surface of a plan vector `v`.
+    #[must_use]
+    pub fn first_form(&self) -> [f64; 3] {
+        [1.0 + self.zx * self.zx, self.zx * self.zy, 1.0 + self.zy * self.zy]
+    }
+
+    /// Second fundamental form `B = Hess z/√(1+|∇z|²)` as `[B11, B12, B22]`, 1/m.
+    #[must_use]
+    pub fn second_form(&self) -> [f64; 3] {
+        [self.zxx, self.zxy, self.zyy].map(|h| h / self.stretch())
+    }
+
+    /// Curvature `vᵀBv / vᵀGv`, 1/m, of the normal section along the plan direction `v`, whatever its length.
+    #[must_use]
+    pub fn normal_curvature(&self, v: DVec2) -> f64 {
+        let apply = |[a, b, c]: [f64; 3]| (a * v.x + 2.0 * b * v.y) * v.x + c * v.y * v.y;
+        apply(self.second_form()) / apply(self.first_form())
+    }
+
+    /// Gaussian, mean and principal curvatures with their directions.
+    #[must_use]
+    pub fn curvature(&self) -> Curvature {
+        // In the G-orthonormal pair along the gradient and the contour, e1 = ĝ/√(1+|∇z|²) and e2 ⊥ ĝ, the
+        // pencil B w = κ G w becomes an ordinary symmetric eigenproblem [a b; b c].
+        let uphill = self.gradient().normalize_or(DVec2::X);
+        let (e1, e2) = (uphill / self.stretch(), uphill.perp());
+        let [b11, b12, b22] = self.second_form();
+        let form =
+            |v: DVec2, w: DVec2| b11 * v.x * w.x + b12 * (v.x * w.y + v.y * w.x) + b22 * v.y * w.y;
+        let (a, b, c) = (form(e1, e1), form(e1, e2), form(e2, e2));
+        let (mean, half) = ((a + c) / 2.0, (a - c) / 2.0);
+        let radius = half.hypot(b);
+        // Of the two expressions for the first eigenvector, the one that does not cancel.
+        let axis =
+            if half >= 0.0 { DVec2::new(half + radius, b) } else { DVec2::new(b, radius - half) };
+        let axis = axis.normalize_or(DVec2::X);
+        Curvature {
+            gaussian: a * c - b * b,
+            mean,
+            principal: [mean + radius, mean - radius],
+            directions: [axis.x * e1 + axis.y * e2, axis.x * e2 - axis.y * e1],
+        }
+    }
+
+    /// `κ1² + κ2² = tr (G⁻¹B)² = 4H² − 2K` without the directions, 1/m².
+    pub(super) fn squared_curvature(&self) -> f64 {
+        let [e, f, g] = self.first_form();
+        // det G
+        let area = 1.0 + self.gradient().length_squared();
+        let twice_mean = (self.zxx * g - 2.0 * self.zxy * f + self.zyy * e) / area;
+        let gaussian = (self.zxx * self.zyy - self.zxy * self.zxy) / area;
+        (twice_mean * twice_mean - 2.0 * gaussian) / area
+    }
+
+    /// Surface area per plan area, `√(1+|∇z|²)`.
+    fn stretch(&self) -> f64 {
+        (1.0 + self.gradient().length_squared()).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn g_product(jet: &HeightJet, v: DVec2, w: DVec2) -> f64 {
+        v.dot(w) + jet.gradient().dot(v) * jet.gradient().dot(w)
+    }
+
+    /// `w_iᵀGw_j = δ_ij` and `κ_i` is the normal curvature along `w_i`.
+    fn check_directions(jet: &HeightJet, tolerance: f64) {
+        let Curvature { gaussian, mean, principal, directions: [w1, w2] } = jet.curvature();
+        assert!((g_product(jet, w1, w1) - 1.0).abs() < 1e-12);
+        assert!((g_product(jet, w2, w2) - 1.0).abs() < 1e-12);
+        assert!(g_product(jet, w1, w2).abs() < 1e-12);
+        assert!((jet.normal_curvature(w1) - principal[0]).abs() < tolerance);
+        assert!((jet.normal_curvature(w2) - principal[1]).abs() < tolerance);
+        assert!(principal[0] >= principal[1]);
+        assert!((principal[0] * principal[1] - gaussian).abs() < tolerance);
+        assert!((principal[0] + principal[1] - 2.0 * mean).abs() < tolerance);
+        let squares = principal[0].powi(2) + principal[1].powi(2);
+        assert!((jet.squared_curvature() - squares).abs() < tolerance);
+    }
+
+    #[test]
+    fn a_sphere_cap_is_umbilic_everywhere() {
+        let radius = 50.0;
+        for (x, y) in [(0.0, 0.0), (10.0, -5.0), (0.0, 30.0), (28.0, 28.0)] {
+            // z = √(R² − x² − y²), a dome: curvature −1/R in all directions.
+            let z = f64::sqrt(radius * radius - x * x - y * y);
+            let jet = HeightJet {
+                z,
+                zx: -x / z,
+                zy: -y / z,
+                zxx: -1.0 / z - x * x / z.powi(3),
+                zxy: -x * y / z.powi(3),
+                zyy: -1.0 / z - y * y / z.powi(3),
+            };
+            let curvature = jet.curvature();
+            for kappa in curvature.principal {
+                assert!((kappa + 1.0 / radius).abs() < 1e-12);
+            }
+            assert!((curvature.gaussian - 1.0 / radius.powi(2)).abs() < 1e-12);
+            check_directions(&jet, 1e-12);
+            let outward = DVec3::new(x, y, z) / radius;
+            assert!((jet.normal() - outward).length() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_trough_bends_across_its_axis_only() {
+        // z = R − √(R² − s²), s measured across an axis that runs along (−sin 0.3, cos 0.3).
+        let (radius, s) = (20.0_f64, 9.0_f64);
+        let across = DVec2::from_angle(0.3);
+        let root = (radius * radius - s * s).sqrt();
+        let (first, second) = (s / root, radius * radius / root.powi(3));
+        let jet = HeightJet {
+            z: radius - root,
+            zx: first * across.x,
+            zy: first * across.y,
+            zxx: second * across.x * across.x,
+            zxy: second * across.x * across.y,
+            zyy: second * across.y * across.y,
+        };
+        let curvature = jet.curvature();
+        assert!((curvature.principal[0] - 1.0 / radius).abs() < 1e-14);
+        assert!(curvature.principal[1].abs() < 1e-14);
+        assert!((curvature.directions[1].dot(across)).abs() < 1e-12);
+        assert!((jet.slope() - (s / radius).asin()).abs() < 1e-14);
+        check_directions(&jet, 1e-14);
+    }
+
+    #[test]
+    fn planes_and_saddles_are_no_trouble() {
+        let plane = HeightJet { zx: 0.3, zy: -2.0, ..Default::default() };
+        assert_eq!(plane.curvature().principal, [0.0, 0.0]);
+        check_directions(&plane, 1e-15);
+        check_directions(&HeightJet::default(), 1e-15);
+        check_directions(&HeightJet { zxx: 1.0, zyy: -1.0, ..plane }, 1e-12);
+        check_directions(&HeightJet { zxy: 1e-3, zx: 1e-200, ..Default::default() }, 1e-15);
+    }
+}

@@ -1,0 +1,376 @@
+//! Separable least squares: rows, then columns.
+//!
+//! Along each axis the fit minimises
+//!
+//! ```text
+//!   Σ_i (s(i) − z_i)² + λ ∫ s‴(t)² dt ,     t in nodes
+//! ```
+//!
+//! A wave `sin ωt` keeps the share `1/(1 + λω⁶)` of its amplitude, so `λ = (L/2π)⁶` halves the waves of
+//! length `L`; for waves of a few cells the spline's own symbols stand in for `ω⁶`.
+//!
+//! The third derivative is penalised for both degrees. The usual smoothing spline of degree 3 penalises
+//! the second; its solution has `s″ = 0` at the border, so that curvature is lost there whatever the terrain.
+//! Error of `s″` relative to its size, for waves `ℓ` of any phase and a cut-off of 16 cells, and `s″` of
+//! unit noise (degree 3; degree 5 differs by little):
+//!
+//! | cells from the border | 0 | 2 | 4 | 8 | 16 | far |
+//! |---|---|---|---|---|---|---|
+//! | `∫ s″²`, `ℓ` = 80 | 1.01 | 0.73 | 0.38 | 0.019 | 0.011 | 0.0011 |
+//! | `∫ s‴²`, `ℓ` = 80 | 0.37 | 0.21 | 0.09 | 0.025 | 0.004 | 0.0005 |
+//! | `∫ s″²`, `ℓ` = 160 | 1.02 | 0.72 | 0.37 | 0.009 | 0.012 | < 0.0001 |
+//! | `∫ s‴²`, `ℓ` = 160 | 0.18 | 0.11 | 0.04 | 0.012 | 0.002 | 0.0001 |
+//! | `∫ s″²`, noise | 0.006 | 0.028 | 0.035 | 0.032 | 0.031 | 0.030 |
+//! | `∫ s‴²`, noise | 0.059 | 0.057 | 0.049 | 0.024 | 0.023 | 0.023 |
+
+use std::f64::consts::TAU;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::banded::{Banded, Ldl};
+use super::basis::{Basis, Local, SUPPORT};
+use super::plan::Plan;
+use crate::{Control, GridFrame, Result};
+
+/// Name of the stage in progress reports.
+const STAGE: &str = "fitting surface";
+
+/// Longest cut-off in knot intervals. It bounds the condition of the normal equations at about `10⁹`. It
+/// is met only by cut-offs of over twelve times the extent of the grid, where all is a quadratic anyway, and in
+/// rows towards a pole whose cells are less than a quarter as wide as the widest.
+const LONGEST_CUTOFF: f64 = 64.0;
+
+/// Columns that are solved together.
+pub(super) const LANES: usize = 16;
+
+/// Splines along one axis and their values at the nodes.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    pub(super) basis: Basis,
+    nodes: Vec<Local>,
+    /// `Σ_i v_i v_iᵀ` with `v_i` the weights at node `i`.
+    gram: Banded,
+}
+
+impl Axis {
+    pub(super) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
+        let basis = Basis::new(degree, nodes, intervals);
+        let nodes: Vec<Local> = (0..nodes).map(|i| basis.at(i as f64)).collect();
+        let mut gram = Banded::zero(basis.len());
+        for node in &nodes {
+            gram.add_outer(node.start, &node.weights[0][..basis.support()], 1.0);
+        }
+        Self { basis, nodes, gram }
+    }
+
+    /// Matrix of `∫ (d^order s/dt^order)² dt`, by Gauss's three points per interval: exact to degree 5.
+    pub(super) fn penalty(&self, order: usize) -> Banded {
+        const GAUSS: [(f64, f64); 3] = [
+            (0.112_701_665_379_258_3, 5.0 / 18.0),
+            (0.5, 8.0 / 18.0),
+            (0.887_298_334_620_741_7, 5.0 / 18.0),
+        ];
+        let mut penalty = Banded::zero(self.basis.len());
+        for k in 0..self.basis.intervals() {
+            for (u, share) in GAUSS {
+                let local = self.basis.at((k as f64 + u) / self.basis.density());
+                let weights = &local.weights[order][..self.basis.support()];
+                penalty.add_outer(local.start, weights, share / self.basis.density());
+            }
+        }
+        penalty
+    }
+
+    /// A cut-off of `cells` nodes, in knot intervals, kept where the equations are sound.
+    fn cutoff(&self, cells: f64) -> f64 {
+        // Fewer knots than nodes without smoothing may leave a coefficient almost without data where
+        // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and is not felt otherwise.
+        let shortest = if self.basis.len() < self.nodes.len() { 0.3 } else { 0.0 };
+        (cells * self.basis.density()).clamp(shortest, LONGEST_CUTOFF)
+    }
+
+    /// `λ` for a cut-off of `cells` nodes: the quotient of the symbols of normal and penalty matrix at that wave,
+    ///
+    /// ```text
+    ///   λ = b(ω)² / ((2 sin ω/2)⁶ r(ω)) ,     b(ω) = Σ_k N(k) cos kω ,     ω = 2π/L per knot
+    /// ```
+    ///
+    /// with `r = 1` for degree 3 and `r = b` for degree 5, from third differences and the products of the
+    /// B-splines they are coefficients of. For long waves it is `(L/2π)⁶`.
+    fn smoothing(&self, cells: f64) -> f64 {
+        let cutoff = self.cutoff(cells);
+        // No wave on the knots is shorter than two of them.
+        let wave = cutoff.max(2.0);
+        let omega = TAU / wave;
+        let values = if self.basis.degree() == 3 {
+            (2.0 + omega.cos()) / 3.0
+        } else {
+            (33.0 + 26.0 * omega.cos() + (2.0 * omega).cos()) / 60.0
+        };
+        let r = if self.basis.degree() == 3 { 1.0 } else { values };
+        let lambda = values * values / ((2.0 * (omega / 2.0).sin()).powi(6) * r);
+        lambda * (cutoff / wave / self.basis.density()).powi(6)
+    }
+
+    /// Factors of the normal matrix for a cut-off of `cells` nodes.
+    fn normal(&self, penalty: &Banded, cells: f64) -> Ldl {
+        let mut normal = self.gram.clone();
+        normal.add(penalty, self.smoothing(cells));
+        normal.factor(self.basis.support() - 1)
+    }
+
+    /// Trace of the matrix that takes heights to fitted heights.
+    pub(super) fn trace(&self, cells: f64) -> f64 {
+        let inverse = self.normal(&self.penalty(3), cells).inverse_band();
+        let form = |node: &Local| -> f64 {
+            let weights = &node.weights[0][..self.basis.support()];
+            let entry = |i: usize, j: usize| inverse[node.start + i.max(j)][i.abs_diff(j)];
+            let row = |i: usize| (0..weights.len()).map(move |j| weights[j] * entry(i, j));
+            (0..weights.len()).map(|i| weights[i] * row(i).sum::<f64>()).sum()
+        };
+        self.nodes.iter().map(form).sum()
+    }
+
+    /// Right-hand side of the normal equations: `Σ_i v_i z_i`.
+    fn project<const W: usize>(&self, heights: impl Iterator<Item = [f64; W]>) -> Vec<[f64; W]> {
+        match self.basis.support() {
+            4 => self.project_of::<4, W>(heights),
+            _ => self.project_of::<SUPPORT, W>(heights),
+        }
+    }
+
+    fn project_of<const N: usize, const W: usize>(
+        &self,
+        heights: impl Iterator<Item = [f64; W]>,
+    ) -> Vec<[f64; W]> {
+        // The weights beyond a narrow grid's support are 0, but what they are added to must exist.
+        let mut sums = vec![[0.0; W]; self.basis.len().max(N)];
+        for (node, z) in self.nodes.iter().zip(heights) {
+            let sums = &mut sums[node.start..node.start + N];
+            for (sum, &weight) in sums.iter_mut().zip(&node.weights[0][..N]) {
+                for (sum, z) in sum.iter_mut().zip(&z) {
+                    *sum += weight * z;
+                }
+            }
+        }
+        sums.truncate(self.basis.len());
+        sums
+    }
+
+    /// Heights of the fit to the finite values of a line, at all its nodes; `None` if there are none.
+    ///
+    /// With few values a lower derivative is penalised, so that what lies beyond them is a line or a
+    /// constant and not a parabola through noise.
+    pub(super) fn complete(
+        &self,
+        penalties: &[Banded; 3],
+        cells: f64,
+        line: &[f64],
+    ) -> Option<Vec<f64>> {
+        let order = match line.iter().filter(|z| z.is_finite()).count() {
+            0 => return None,
+            1 => 1,
+            2..=5 => 2,
+            _ => 3,
+        };
+        let support = self.basis.support();
+        let mut normal = Banded::zero(self.basis.len());
+        let mut x = vec![[0.0]; self.basis.len()];
+        for (node, z) in self.nodes.iter().zip(line).filter(|(_, z)| z.is_finite()) {
+            let weights = &node.weights[0][..support];
+            normal.add_outer(node.start, weights, 1.0);
+            x[node.start..].iter_mut().zip(weights).for_each(|([x], w)| *x += w * z);
+        }
+        let length = self.cutoff(cells) / self.basis.density() / TAU;
+        normal.add(&penalties[order - 1], length.powi(2 * order as i32));
+        normal.factor(support - 1).solve(&mut x);
+        let x = x.as_flattened();
+        Some(self.nodes.iter().map(|n| dot(&n.weights[0][..support], &x[n.start..])).collect())
+    }
+}
+
+/// Coefficients of a tensor-product spline, row-major, and its two axes.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+    pub(super) coefficients: Vec<f64>,
+}
+
+impl Fit {
+    /// Fits heights without voids, in place of which the coefficients are built.
+    pub(super) fn new(
+        frame: &GridFrame,
+        mut heights: Vec<f64>,
+        plan: &Plan,
+        control: &Control,
+    ) -> Result<Self> {
+        let x = Axis::new(plan.degree, frame.cols(), plan.intervals[0]);
+        let y = Axis::new(plan.degree, frame.rows(), plan.intervals[1]);
+        control.report(STAGE, 0.0);
+        solve_rows(frame, &x, plan.cutoff, &mut heights, control)?;
+        keep_leading(&mut heights, frame.cols(), x.basis.len());
+        control.report(STAGE, 0.5);
+        solve_columns(
+            &y,
+            plan.cutoff / frame.mid_spacing().y,
+            &mut heights,
+            x.basis.len(),
+            control,
+        )?;
+        heights.truncate(x.basis.len() * y.basis.len());
+        heights.shrink_to_fit();
+        control.report(STAGE, 1.0);
+        Ok(Self { x, y, coefficients: heights })
+    }
+
+    /// Values at the nodes of a row.
+    pub(super) fn row_values(&self, row: usize, values: &mut [f64]) {
+        let [line] = self.contract(&self.y.nodes[row], [0]);
+        let support = self.x.basis.support();
+        for (value, node) in values.iter_mut().zip(&self.x.nodes) {
+            *value = dot(&node.weights[0][..support], &line[node.start..]);
+        }
+    }
+
+    /// Derivatives at the nodes of a row: `f` gets the column and `z` differentiated `[i, j]` times
+    /// along columns and rows, `[0,0] [1,0] [0,1] [2,0] [1,1] [0,2]`, per node.
+    pub(super) fn row_derivatives(&self, row: usize, f: impl FnMut(usize, [f64; 6])) {
+        match self.x.basis.support() {
+            4 => self.row_derivatives_of::<4>(row, f),
+            _ => self.row_derivatives_of::<SUPPORT>(row, f),
+        }
+    }
+
+    fn row_derivatives_of<const N: usize>(&self, row: usize, mut f: impl FnMut(usize, [f64; 6])) {
+        let mut lines = self.contract(&self.y.nodes[row], [0, 1, 2]);
+        // The weights beyond a narrow grid's support are 0, but their coefficients must exist.
+        lines.iter_mut().for_each(|line| line.resize(line.len().max(N), 0.0));
+        for (col, Local { start, weights }) in self.x.nodes.iter().enumerate() {
+            let [line, line_y, line_yy] = [0, 1, 2].map(|i| &lines[i][*start..*start + N]);
+            let [value, first, second] = [0, 1, 2].map(|order| &weights[order][..N]);
+            f(
+                col,
+                [
+                    dot(value, line),
+                    dot(first, line),
+                    dot(value, line_y),
+                    dot(second, line),
+                    dot(first, line_y),
+                    dot(value, line_yy),
+                ],
+            );
+        }
+    }
+
+    /// `z` differentiated `orders[k]` times along columns and rows, per node, at grid coordinates `at`.
+    pub(super) fn derivatives<const K: usize>(
+        &self,
+        at: DVec2,
+        orders: [[usize; 2]; K],
+    ) -> [f64; K] {
+        let (x, y) = (self.x.basis.at(at.x), self.y.basis.at(at.y));
+        let support = self.x.basis.support();
+        orders.map(|[i, j]| {
+            (0..self.y.basis.support())
+                .map(|k| {
+                    let line = &self.coefficients[(y.start + k) * self.x.basis.len() + x.start..];
+                    y.weights[j][k] * dot(&x.weights[i][..support], line)
+                })
+                .sum()
+        })
+    }
+
+    /// The coefficients along `x` of the given derivatives in `y`.
+    fn contract<const K: usize>(&self, y: &Local, orders: [usize; K]) -> [Vec<f64>; K] {
+        let width = self.x.basis.len();
+        let mut lines = orders.map(|_| vec![0.0; width]);
+        for k in 0..self.y.basis.support() {
+            let row = &self.coefficients[(y.start + k) * width..][..width];
+            for (line, order) in lines.iter_mut().zip(orders) {
+                let weight = y.weights[order][k];
+                line.iter_mut().zip(row).for_each(|(sum, c)| *sum += weight * c);
+            }
+        }
+        lines
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Fits every row; its coefficients take the place of its first heights.
+fn solve_rows(
+    frame: &GridFrame,
+    axis: &Axis,
+    cutoff: f64,
+    heights: &mut [f64],
+    control: &Control,
+) -> Result<()> {
+    let cells = |row: usize| if cutoff > 0.0 { cutoff / frame.spacing(row as f64).x } else { 0.0 };
+    let penalty = axis.penalty(3);
+    let shared = axis.normal(&penalty, cells(0));
+    heights.par_chunks_mut(frame.cols()).enumerate().try_for_each(|(row, heights)| {
+        control.check()?;
+        let mut x = axis.project(heights.iter().map(|&z| [z]));
+        if cells(row) == cells(0) {
+            shared.solve(&mut x);
+        } else {
+            axis.normal(&penalty, cells(row)).solve(&mut x);
+        }
+        for (height, [coefficient]) in heights.iter_mut().zip(x) {
+            *height = coefficient;
+        }
+        Ok(())
+    })
+}
+
+/// Shortens every row of `width` values to its first `kept`.
+fn keep_leading(values: &mut Vec<f64>, width: usize, kept: usize) {
+    if kept < width {
+        let rows = values.len() / width;
+        for row in 1..rows {
+            values.copy_within(row * width..row * width + kept, row * kept);
+        }
+        values.truncate(rows * kept);
+    }
+}
+
+/// Fits every column; its coefficients take the place of its first values.
+fn solve_columns(
+    axis: &Axis,
+    cells: f64,
+    values: &mut [f64],
+    width: usize,
+    control: &Control,
+) -> Result<()> {
+    let normal = axis.normal(&axis.penalty(3), cells);
+    stripes(values, width).into_par_iter().try_for_each(|mut stripe| {
+        control.check()?;
+        let mut x = axis.project(stripe.iter().map(|piece| {
+            let mut lanes = [0.0; LANES];
+            lanes[..piece.len()].copy_from_slice(piece);
+            lanes
+        }));
+        normal.solve(&mut x);
+        for (piece, lanes) in stripe.iter_mut().zip(&x) {
+            piece.copy_from_slice(&lanes[..piece.len()]);
+        }
+        Ok(())
+    })
+}
+
+/// Stripes of [`LANES`] columns as lists of row pieces, so that threads can write them without overlap.
+pub(super) fn stripes(values: &mut [f64], width: usize) -> Vec<Vec<&mut [f64]>> {
+    let rows = values.len() / width;
+    let mut stripes: Vec<_> =
+        (0..width.div_ceil(LANES)).map(|_| Vec::with_capacity(rows)).collect();
+    for row in values.chunks_mut(width) {
+        for (stripe, piece) in stripes.iter_mut().zip(row.chunks_mut(LANES)) {
+            stripe.push(piece);
+        }
+    }
+    stripes
+}

@@ -1,0 +1,162 @@
+//! Which knots and how much smoothing: given, or chosen by the data.
+
+use glam::DVec2;
+
+use super::fit::Fit;
+use super::residuals::residuals;
+use super::voids::fill;
+use crate::{Control, GridFrame, Result};
+
+/// Knot intervals per cut-off wavelength: what a longer cut-off removes needs no knots. With 16 the
+/// spline's own error in the second derivative of a wave of that length, `(ωh)²/12`, is 1.3 %.
+const KNOTS_PER_CUTOFF: f64 = 16.0;
+
+/// What to fit: the knots and the smoothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    /// Degree of the splines, 3 or 5.
+    pub(super) degree: usize,
+    /// Knot intervals along columns (`x`) and rows (`y`).
+    pub(super) intervals: [usize; 2],
+    /// Cut-off wavelength in metres; 0 for none.
+    pub(super) cutoff: f64,
+}
+
+impl Plan {
+    /// Knots at all nodes: the spline interpolates.
+    pub(super) fn every_node(frame: &GridFrame, degree: usize) -> Self {
+        Self { degree, intervals: [frame.cols() - 1, frame.rows() - 1], cutoff: 0.0 }
+    }
+
+    /// No more knots than a cut-off of `cutoff` metres needs.
+    pub(super) fn smooth(frame: &GridFrame, degree: usize, cutoff: f64) -> Self {
+        let needed = |nodes: usize, spacing: f64| {
+            let intervals = (nodes - 1) as f64 * spacing * KNOTS_PER_CUTOFF / cutoff;
+            (intervals.ceil() as usize).max(degree).min(nodes - 1)
+        };
+        let widest = (0..frame.rows()).map(|r| frame.spacing(r as f64).x).fold(0.0, f64::max);
+        let intervals = [needed(frame.cols(), widest), needed(frame.rows(), frame.mid_spacing().y)];
+        Self { degree, intervals, cutoff }
+    }
+
+    /// About square knot intervals, `longer` of them along the longer side; no smoothing.
+    pub(super) fn coarse(frame: &GridFrame, degree: usize, longer: usize) -> Self {
+        let most = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
+        let extent = most * frame.mid_spacing();
+        let share = (extent / extent.max_element().max(f64::MIN_POSITIVE)) * longer as f64;
+        let intervals = share.ceil().min(most);
+        Self { degree, intervals: [intervals.x as usize, intervals.y as usize], cutoff: 0.0 }
+    }
+}
+
+/// Side in metres of a square as large as a cell in the middle of the grid.
+pub(super) fn mean_cell(frame: &GridFrame) -> f64 {
+    let DVec2 { x, y } = frame.mid_spacing();
+    (x * y).sqrt()
+}
+
+/// The plan with the fewest knots whose residuals have a root mean square of at most `rms`, by bisection.
+pub(super) fn fewest_knots(
+    frame: &GridFrame,
+    heights: &[f64],
+    degree: usize,
+    rms: f64,
+    control: &Control,
+) -> Result<Plan> {
+    let quiet = Control { cancel: control.cancel.clone(), progress: None };
+    let filled = fill(frame, heights, &Plan::every_node(frame, degree), &quiet)?;
+    // Knots at every node interpolate, so the upper end always meets the tolerance.
+    let (mut few, mut enough) = (0, frame.cols().max(frame.rows()) - 1);
+    while few < enough {
+        let middle = few.midpoint(enough);
+        let plan = Plan::coarse(frame, degree, middle);
+        let fit = Fit::new(frame, filled.clone(), &plan, &quiet)?;
+        if residuals(frame, &fit, heights).rms <= rms {
+            enough = middle;
+        } else {
+            few = middle + 1;
+        }
+    }
+    Ok(Plan::coarse(frame, degree, enough))
+}
+
+/// The cut-off in metres with the least generalised cross-validation score (Craven and Wahba, Numer.
+/// Math. 31, 1979)
+///
+/// ```text
+///   GCV = N Σ(s − z)² / (N − tr A)² ,     tr A = tr A_x · tr A_y
+/// ```
+///
+/// where `A = A_y ⊗ A_x` takes heights to fitted heights, a separable fit's trace being the product.
+/// Lengths by powers of two from 2 cells to half the extent, then a golden section around the best.
+pub(super) fn cross_validate(
+    frame: &GridFrame,
+    heights: &[f64],
+    degree: usize,
+    control: &Control,
+) -> Result<f64> {
+    let quiet = Control { cancel: control.cancel.clone(), progress: None };
+    let (frame, heights) = window(frame, heights)?;
+    let cell = mean_cell(&frame);
+    let filled = fill(&frame, &heights, &Plan::every_node(&frame, degree), &quiet)?;
+    let valid = heights.iter().filter(|z| z.is_finite()).count() as f64;
+    let score = |log_cells: f64| -> Result<f64> {
+        let plan = Plan::smooth(&frame, degree, log_cells.exp2() * cell);
+        let fit = Fit::new(&frame, filled.clone(), &plan, &quiet)?;
+        let [x, y] = (plan.cutoff / frame.mid_spacing()).to_array();
+        let freedom = valid * (1.0 - fit.x.trace(x) * fit.y.trace(y) / frame.nodes() as f64);
+        let gcv = (residuals(&frame, &fit, &heights).rms * valid / freedom).powi(2);
+        Ok(if freedom > 0.0 { gcv } else { f64::INFINITY })
+    };
+    let longest = (frame.cols().max(frame.rows()) as f64 / 2.0).log2().max(2.0) as usize;
+    let mut best = (f64::INFINITY, 1.0);
+    for log_cells in 1..=longest {
+        let gcv = score(log_cells as f64)?;
+        if gcv < best.0 {
+            best = (gcv, log_cells as f64);
+        }
+    }
+    let log_cells = golden_section(best.1 - 1.0, best.1 + 1.0, score)?;
+    Ok(log_cells.exp2() * cell)
+}
+
+/// Where `f` is least between `low` and `high`, to 5 % of their distance.
+fn golden_section(low: f64, high: f64, f: impl Fn(f64) -> Result<f64>) -> Result<f64> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut low, mut high) = (low, high);
+    let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+    let mut values = [f(inner[0])?, f(inner[1])?];
+    for _ in 0..6 {
+        if values[0] <= values[1] {
+            high = inner[1];
+            inner = [high - GOLDEN * (high - low), inner[0]];
+            values = [f(inner[0])?, values[0]];
+        } else {
+            low = inner[0];
+            inner = [inner[1], low + GOLDEN * (high - low)];
+            values = [values[1], f(inner[1])?];
+        }
+    }
+    Ok((low + high) / 2.0)
+}
+
+/// The part of at most 1024 × 1024 nodes, of nine spread over the grid, with the fewest voids.
+fn window(frame: &GridFrame, heights: &[f64]) -> Result<(GridFrame, Vec<f64>)> {
+    const SIDE: usize = 1024;
+    let (cols, rows) = (frame.cols().min(SIDE), frame.rows().min(SIDE));
+    let voids = |&(col, row): &(usize, usize)| {
+        let lines = heights.chunks(frame.cols()).skip(row).take(rows);
+        lines.flat_map(|line| &line[col..col + cols]).filter(|z| !z.is_finite()).count()
+    };
+    // The middle first: it wins ties.
+    let thirds = |nodes: usize, side: usize| [1, 0, 2].map(|i| i * (nodes - side) / 2);
+    let (col, row) = thirds(frame.rows(), rows)
+        .into_iter()
+        .flat_map(|row| thirds(frame.cols(), cols).map(|col| (col, row)))
+        .min_by_key(voids)
+        .expect("nine places");
+    let corner = frame.to_map(DVec2::new(col as f64, row as f64));
+    let part = GridFrame::new(cols, rows, corner, frame.step(), frame.ground())?;
+    let lines = heights.chunks(frame.cols()).skip(row).take(rows);
+    Ok((part, lines.flat_map(|line| &line[col..col + cols]).copied().collect()))
+}

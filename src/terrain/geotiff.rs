@@ -1,0 +1,508 @@
+//! GeoTIFF: what the samples of a TIFF mean, and where they lie.
+//!
+//! References: *OGC GeoTIFF Standard* (OGC 19-008r4); the GDAL GeoTIFF driver page for the tags `GDAL_NODATA`
+//! and `GDAL_METADATA`, internal masks, sparse files and world files.
+
+use std::fs;
+use std::path::Path;
+
+use glam::DVec2;
+
+use super::crs::{Crs, GeoKeys, key, length_unit};
+use super::tiff::{Directory, Fault, Layout, Outcome, Sample, Tiff, damaged, tag, unsupported};
+use super::{Raster, Source, Want};
+use crate::{Error, Result};
+
+/// Reads a GeoTIFF that lies in memory.
+pub(super) fn read(path: &Path, bytes: &[u8], want: Want) -> Result<Raster> {
+    read_image(path, bytes, want).map_err(|fault| match fault {
+        Fault::Damaged(message) => Error::format(path, message),
+        Fault::Unsupported(message) => Error::unsupported(path, message),
+    })
+}
+
+fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
+    let images = Tiff::new(bytes)?.directories()?;
+    let mut notes = Vec::new();
+    let image = full_resolution(&images, &mut notes)?;
+    let layout = Layout::new(image)?;
+    check_meaning(image, &layout)?;
+
+    let keys = geo_keys(image)?;
+    let metadata = image.text(tag::GDAL_METADATA)?.unwrap_or_default();
+    let unit = match want {
+        Want::Heights => height_unit(&keys, &metadata)?,
+        Want::Bands => None,
+    };
+    // Tie points give the centre of a cell, not its corner.
+    let point = keys.short(key::RASTER_TYPE) == Some(2);
+    let (origin, step) =
+        placement(image, point)?.or_else(|| world_file(path)).unwrap_or_else(|| {
+            notes.push(
+                "the file is not georeferenced: cells of 1 map unit at the origin are assumed"
+                    .to_owned(),
+            );
+            (DVec2::new(0.5, layout.rows as f64 - 0.5), DVec2::new(1.0, -1.0))
+        });
+    let crs = Crs::from_geo_keys(keys).map_err(|e| Fault::Unsupported(e.to_string()))?;
+    if want == Want::Heights {
+        if layout.bands > 1 {
+            notes.push(format!(
+                "the file has {} bands; the first is taken for the height",
+                layout.bands
+            ));
+        }
+        if unit.is_none() && crs.unit().contains("foot") {
+            notes.push(format!(
+                "the map unit is the {}, but the file does not say the unit of the heights; they are taken as metres",
+                crs.unit()
+            ));
+        }
+    }
+    let nodata = image.text(tag::GDAL_NODATA)?.map(|t| t.trim().to_owned());
+    let bands = match want {
+        Want::Heights => 0..1,
+        Want::Bands => 0..layout.bands,
+    };
+    let mask = internal_mask(&images, &layout)?;
+    let bands = bands
+        .map(|band| {
+            let mut values = layout.band(band)?;
+            void_nodata(&mut values, layout.sample, nodata.as_deref(), mask.as_deref(), &mut notes);
+            scale(&mut values, &metadata, band)?;
+            Ok(values)
+        })
+        .collect::<Outcome<_>>()?;
+    let (height_unit, metres_per_height_unit) = unit.unwrap_or(("metre", 1.0));
+    Ok(Raster {
+        cols: layout.cols,
+        rows: layout.rows,
+        origin,
+        step,
+        crs,
+        bands,
+        source: Source {
+            format: "GeoTIFF".to_owned(),
+            sample: layout.sample.name(),
+            height_unit: height_unit.to_owned(),
+            metres_per_height_unit,
+            nodata,
+            south_up: false,
+        },
+        notes,
+    })
+}
+
+/// Bits of `NewSubfileType`.
+const REDUCED: u64 = 1;
+const MASK: u64 = 4;
+
+/// The first image that is neither a thumbnail, nor an overview, nor a mask.
+fn full_resolution<'a, 'b>(
+    images: &'b [Directory<'a>],
+    notes: &mut Vec<String>,
+) -> Outcome<&'b Directory<'a>> {
+    let mut whole = Vec::new();
+    for image in images {
+        if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == 0 {
+            whole.push(image);
+        }
+    }
+    if whole.len() > 1 {
+        notes.push(format!("the file has {} images; the first is read", whole.len()));
+    }
+    Ok(whole.first().copied().unwrap_or(&images[0]))
+}
+
+/// Refuses pictures.
+fn check_meaning(image: &Directory, layout: &Layout) -> Outcome<()> {
+    match (image.uint(tag::PHOTOMETRIC, 1)?, layout.sample) {
+        (_, Sample::Packed(1)) => unsupported("one bit per sample is a mask, not heights"),
+        // Neither 0, white is lowest, nor 1, black is lowest, changes a height.
+        (0 | 1, _) => Ok(()),
+        // GDAL calls three floating-point bands RGB if told so, and they may well be a tensor.
+        (2, sample) if sample.is_float() => Ok(()),
+        (2, _) => unsupported(
+            "an RGB picture, not heights; if one band holds heights, take it with `gdal_translate -b`",
+        ),
+        (3, _) => unsupported("a palette picture: its numbers are indexes of colours, not heights"),
+        (4, _) => unsupported("a transparency mask, not heights"),
+        (other, _) => {
+            unsupported(format!("a picture (photometric interpretation {other}), not heights"))
+        }
+    }
+}
+
+/// The GeoKeys; none at all if the image has no directory of them.
+fn geo_keys(image: &Directory) -> Outcome<GeoKeys> {
+    let directory = image.uints(tag::GEO_KEY_DIRECTORY)?.unwrap_or_default();
+    Ok(GeoKeys {
+        directory: directory.into_iter().map(|v| v as u16).collect(),
+        doubles: image.doubles(tag::GEO_DOUBLE_PARAMS)?,
+        ascii: image.text(tag::GEO_ASCII_PARAMS)?.unwrap_or_default().into_owned(),
+    })
+}
+
+/// Map coordinates of the centre of the first cell, and the step per column and stored row.
+fn placement(image: &Directory, point: bool) -> Outcome<Option<(DVec2, DVec2)>> {
+    const ROTATED: &str = "the grid is rotated or sheared against the map; \
+                           make it north-up with `gdalwarp -r bilinear IN OUT.tif`";
+    let half = if point { 0.0 } else { 0.5 };
+    let matrix = image.doubles(tag::MODEL_TRANSFORMATION)?;
+    if let [a, b, _, x, d, e, _, y, ..] = matrix[..] {
+        // Rounding in the writer leaves dust; a real rotation moves the far corner by much more.
+        if b.abs() > 1e-9 * e.abs() || d.abs() > 1e-9 * a.abs() {
+            return unsupported(ROTATED);
+        }
+        let step = DVec2::new(a, e);
+        return Ok(Some((DVec2::new(x, y) + half * step, check_step(step)?)));
+    }
+    let scale = image.doubles(tag::MODEL_PIXEL_SCALE)?;
+    let ties = image.doubles(tag::MODEL_TIE_POINT)?;
+    match (&scale[..], &ties[..]) {
+        ([sx, sy, ..], [i, j, _, x, y, ..]) => {
+            let step = check_step(DVec2::new(*sx, -sy))?;
+            Ok(Some((DVec2::new(*x, *y) + step * (DVec2::splat(half) - DVec2::new(*i, *j)), step)))
+        }
+        ([], [_, _, _, _, _, _, _, ..]) => unsupported(
+            "the grid is placed by ground control points; make it north-up with `gdalwarp -tps IN OUT.tif`",
+        ),
+        _ => Ok(None),
+    }
+}
+
+fn check_step(step: DVec2) -> Outcome<DVec2> {
+    if step.is_finite() && step.abs().min_element() > 0.0 {
+        Ok(step)
+    } else {
+        damaged(format!("the cell size is {} × {}; it must be finite and not zero", step.x, step.y))
+    }
+}
+
+/// The six lines of a world file beside: x per column, y per column, x per row, y per row, centre x, centre y.
+fn world_file(path: &Path) -> Option<(DVec2, DVec2)> {
+    let beside = ["tfw", "TFW", "tifw", "wld"].into_iter();
+    let text = beside.map(|e| path.with_extension(e)).find_map(|p| fs::read_to_string(p).ok())?;
+    let numbers: Vec<f64> = text.split_whitespace().map_while(|t| t.parse().ok()).collect();
+    match numbers[..] {
+        [a, 0.0, 0.0, e, x, y] => {
+            check_step(DVec2::new(a, e)).ok().map(|step| (DVec2::new(x, y), step))
+        }
+        _ => None,
+    }
+}
+
+/// Turns nodata, infinite and masked cells to `NaN`, and notes what looks like nodata but is not declared.
+fn void_nodata(
+    values: &mut [f64],
+    sample: Sample,
+    nodata: Option<&str>,
+    mask: Option<&[f64]>,
+    notes: &mut Vec<String>,
+) {
+    if let Some(text) = nodata {
+        match text.replace(',', ".").parse::<f64>() {
+            // A value out of the range of the samples is not met, as it should be.
+            Ok(nodata) => {
+                let nodata = sample.round(nodata);
+                values.iter_mut().filter(|v| **v == nodata).for_each(|v| *v = f64::NAN);
+            }
+            Err(_) => {
+                notes.push(format!("the nodata value `{text}` is not a number and was left alone"))
+            }
+        }
+    }
+    super::void_infinite(values);
+    for (value, _) in
+        values.iter_mut().zip(mask.unwrap_or_default()).filter(|(_, valid)| matches!(valid, 0.0))
+    {
+        *value = f64::NAN;
+    }
+    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    // Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
+    if lowest < -12_000.0 || lowest == -9999.0 {
+        notes.push(format!(
+            "some cells hold {lowest}, which looks like a void that is not declared; \
+             declare it with `gdal_edit.py -a_nodata {lowest}`"
+        ));
+    }
+}
+
+/// Validity of each cell from an internal mask of the same size: 1 where valid.
+fn internal_mask(images: &[Directory], layout: &Layout) -> Outcome<Option<Vec<f64>>> {
+    for image in images {
+        if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == MASK {
+            let mask = Layout::new(image)?;
+            if (mask.cols, mask.rows) == (layout.cols, layout.rows) {
+                return mask.band(0).map(Some);
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Text of the item of `GDAL_METADATA` with a role, for one band.
+fn metadata_item<'a>(metadata: &'a str, role: &str, band: usize) -> Option<&'a str> {
+    let role = format!("role=\"{role}\"");
+    let sample = format!("sample=\"{band}\"");
+    metadata.split("<Item ").skip(1).find_map(|item| {
+        let (attributes, rest) = item.split_once('>')?;
+        let text = rest.split_once('<')?.0;
+        (attributes.contains(&role) && attributes.contains(&sample)).then(|| text.trim())
+    })
+}
+
+/// What the stored number `v` stands for: `scale · v + offset`.
+fn scale(values: &mut [f64], metadata: &str, band: usize) -> Outcome<()> {
+    let number = |role, default| match metadata_item(metadata, role, band) {
+        None => Ok(default),
+        Some(text) => match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => damaged(format!("the {role} `{text}` in GDAL_METADATA is not a number")),
+        },
+    };
+    let (scale, offset) = (number("scale", 1.0)?, number("offset", 0.0)?);
+    if (scale, offset) != (1.0, 0.0) {
+        values.iter_mut().for_each(|v| *v = scale * *v + offset);
+    }
+    Ok(())
+}
+
+/// Name and metres of the unit of the heights: the band's own, else that of the vertical CRS.
+fn height_unit(keys: &GeoKeys, metadata: &str) -> Outcome<Option<(&'static str, f64)>> {
+    if let Some(text) = metadata_item(metadata, "unittype", 0).filter(|t| !t.is_empty()) {
+        return match named_unit(text) {
+            Some(unit) => Ok(Some(unit)),
+            None => unsupported(format!(
+                "the unit of the heights is `{text}`, which is not known; scale them to metres, for instance with `gdal_calc.py`"
+            )),
+        };
+    }
+    if let Some(code) = keys.short(key::VERTICAL_UNITS).filter(|c| *c != 32767) {
+        return match length_unit(code) {
+            Some(unit) => Ok(Some(unit)),
+            None => unsupported(format!(
+                "the unit of the heights is EPSG:{code}, which is not known; scale them to metres"
+            )),
+        };
+    }
+    Ok(keys.short(key::VERTICAL_CRS).and_then(|code| match code {
+        // EPSG: NGVD29, NAVD88 and mean sea level in US survey feet; NAVD88 and mean sea level in feet.
+        5702 | 6360 | 8052 => length_unit(9003),
+        8228 | 8050 => length_unit(9002),
+        _ => None,
+    }))
+}
+
+fn named_unit(name: &str) -> Option<(&'static str, f64)> {
+    let name = name.to_ascii_lowercase().replace(['_', '-'], " ");
+    let name = name.trim();
+    match name {
+        "m" | "metre" | "metres" | "meter" | "meters" => length_unit(9001),
+        "ft" | "foot" | "feet" | "international foot" | "international feet" => length_unit(9002),
+        "us ft" | "usft" | "ftus" | "us foot" | "us feet" | "us survey foot" | "us survey feet"
+        | "foot us" => length_unit(9003),
+        "cm" | "centimetre" | "centimeter" => Some(("centimetre", 0.01)),
+        "dm" | "decimetre" | "decimeter" => Some(("decimetre", 0.1)),
+        "mm" | "millimetre" | "millimeter" => Some(("millimetre", 0.001)),
+        "km" | "kilometre" | "kilometer" => Some(("kilometre", 1000.0)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A little-endian TIFF of one uncompressed strip, with further tags of shorts, doubles or text.
+    struct Writer {
+        entries: Vec<(u16, u16, u32, Vec<u8>)>,
+    }
+
+    impl Writer {
+        fn new(cols: u16, bits: u16, format: u16, data: &[u8]) -> Self {
+            let rows = (data.len() * 8 / usize::from(bits * cols)) as u16;
+            let mut writer = Self { entries: Vec::new() };
+            for (tag, value) in [
+                (tag::IMAGE_WIDTH, cols),
+                (tag::IMAGE_LENGTH, rows),
+                (tag::BITS_PER_SAMPLE, bits),
+                (tag::PHOTOMETRIC, 1),
+                (tag::SAMPLE_FORMAT, format),
+                (tag::STRIP_BYTE_COUNTS, data.len() as u16),
+            ] {
+                writer = writer.shorts(tag, &[value]);
+            }
+            writer.entries.push((tag::STRIP_OFFSETS, 4, 0, data.to_vec()));
+            writer
+        }
+
+        fn shorts(mut self, tag: u16, values: &[u16]) -> Self {
+            let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            self.entries.push((tag, 3, values.len() as u32, bytes));
+            self
+        }
+
+        fn doubles(mut self, tag: u16, values: &[f64]) -> Self {
+            let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            self.entries.push((tag, 12, values.len() as u32, bytes));
+            self
+        }
+
+        fn text(mut self, tag: u16, text: &str) -> Self {
+            self.entries.push((tag, 2, text.len() as u32 + 1, [text.as_bytes(), b"\0"].concat()));
+            self
+        }
+
+        fn bytes(&self) -> Vec<u8> {
+            let mut head = b"II\x2a\0\x08\0\0\0".to_vec();
+            head.extend((self.entries.len() as u16).to_le_bytes());
+            let after = head.len() + 12 * self.entries.len() + 4;
+            let mut tail: Vec<u8> = Vec::new();
+            for (tag, kind, count, bytes) in &self.entries {
+                let offset = ((after + tail.len()) as u32).to_le_bytes();
+                head.extend(tag.to_le_bytes());
+                head.extend(kind.to_le_bytes());
+                // The strip is one value, the place of the data.
+                head.extend(count.max(&1).to_le_bytes());
+                if bytes.len() <= 4 && *count > 0 {
+                    let mut inline = bytes.clone();
+                    inline.resize(4, 0);
+                    head.extend(inline);
+                } else {
+                    head.extend(offset);
+                    tail.extend(bytes);
+                }
+            }
+            head.extend([0; 4]);
+            head.extend(tail);
+            head
+        }
+
+        fn read(&self) -> Result<Raster> {
+            read(Path::new("dem.tif"), &self.bytes(), Want::Heights)
+        }
+
+        fn refusal(&self) -> String {
+            self.read().unwrap_err().to_string()
+        }
+    }
+
+    fn int16(values: &[i16]) -> Writer {
+        let data: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        Writer::new(2, 16, 2, &data)
+    }
+
+    const UTM: [u16; 16] = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32631];
+
+    #[test]
+    fn tie_points_give_corners_or_centres() {
+        let placed = |area_or_point| {
+            let mut keys = UTM;
+            keys[11] = area_or_point;
+            let writer = int16(&[1, 2, 3, 4, 5, 6])
+                .doubles(tag::MODEL_PIXEL_SCALE, &[30.0, 60.0, 0.0])
+                .doubles(tag::MODEL_TIE_POINT, &[1.0, 1.0, 0.0, 400_030.0, 4_700_000.0, 0.0])
+                .shorts(tag::GEO_KEY_DIRECTORY, &keys);
+            writer.read().unwrap()
+        };
+        let area = placed(1);
+        assert_eq!(area.origin, DVec2::new(400_015.0, 4_700_030.0));
+        assert_eq!(area.step, DVec2::new(30.0, -60.0));
+        assert_eq!((area.cols, area.rows, area.crs.epsg()), (2, 3, Some(32631)));
+        assert_eq!(area.bands[0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(placed(2).origin, DVec2::new(400_000.0, 4_700_060.0));
+    }
+
+    #[test]
+    fn matrices_may_be_south_up_but_not_rotated() {
+        let placed = |b: f64, e: f64| {
+            let mut matrix = [0.0; 16];
+            (matrix[0], matrix[1], matrix[3]) = (10.0, b, 500.0);
+            (matrix[4], matrix[5], matrix[7]) = (b, e, 900.0);
+            int16(&[1, 2, 3, 4]).doubles(tag::MODEL_TRANSFORMATION, &matrix)
+        };
+        let raster = placed(0.0, 10.0).read().unwrap();
+        assert_eq!((raster.origin, raster.step), (DVec2::new(505.0, 905.0), DVec2::splat(10.0)));
+        assert!(placed(1.0, -10.0).refusal().contains("gdalwarp"));
+        assert!(placed(0.0, 0.0).refusal().contains("cell size"));
+    }
+
+    #[test]
+    fn nodata_scale_and_unit_are_applied_in_this_order() {
+        let item = |role: &str, value: &str| {
+            format!("<Item name=\"X\" sample=\"0\" role=\"{role}\">{value}</Item>")
+        };
+        let metadata = item("scale", "0.5") + &item("offset", "100") + &item("unittype", "ft");
+        let writer =
+            int16(&[-1, 10]).text(tag::GDAL_NODATA, "-1.0").text(tag::GDAL_METADATA, &metadata);
+        let raster = writer.read().unwrap();
+        assert!(raster.bands[0][0].is_nan());
+        assert_eq!(raster.bands[0][1], 105.0);
+        assert_eq!(raster.source.metres_per_height_unit, 0.3048);
+        assert_eq!(raster.source.nodata.as_deref(), Some("-1.0"));
+        let writer = int16(&[1, 2]).text(tag::GDAL_METADATA, &item("unittype", "smoot"));
+        assert!(writer.refusal().contains("smoot"));
+    }
+
+    #[test]
+    fn nodata_is_compared_as_the_samples_are_stored() {
+        let data: Vec<u8> = [f32::MIN, 0.1, f32::INFINITY, f32::NAN, 1.0, 2.0]
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
+        let voids = |nodata: &str| {
+            let writer = Writer::new(2, 32, 3, &data).text(tag::GDAL_NODATA, nodata);
+            writer.read().unwrap().bands[0].iter().map(|v| v.is_nan()).collect::<Vec<_>>()
+        };
+        assert_eq!(voids("-3.40282346638529e+38"), [true, false, true, true, false, false]);
+        assert_eq!(voids("0.1"), [false, true, true, true, false, false]);
+        assert_eq!(voids("nan"), [false, false, true, true, false, false]);
+    }
+
+    #[test]
+    fn undeclared_voids_are_noted_and_kept() {
+        let raster = int16(&[-32768, 5]).read().unwrap();
+        assert_eq!(raster.bands[0], [-32768.0, 5.0]);
+        assert!(raster.notes.iter().any(|n| n.contains("-32768")));
+    }
+
+    #[test]
+    fn pictures_and_unknown_units_are_refused() {
+        assert!(
+            Writer::new(2, 8, 1, &[0; 4]).shorts(tag::COMPRESSION, &[7]).refusal().contains("JPEG")
+        );
+        assert!(Writer::new(8, 1, 1, &[0; 4]).refusal().contains("one bit"));
+        assert!(Writer::new(1, 64, 6, &[0; 8]).refusal().contains("complex"));
+        let keys = [1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 32767, 3076, 0, 1, 9300];
+        assert!(int16(&[1, 2]).shorts(tag::GEO_KEY_DIRECTORY, &keys).refusal().contains("unit"));
+    }
+
+    #[test]
+    fn a_world_file_places_the_grid() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dem.tif");
+        fs::write(&path, int16(&[1, 2, 3, 4]).bytes()).unwrap();
+        let terrain = crate::Terrain::open(&path).unwrap();
+        assert_eq!(terrain.frame().step(), DVec2::ONE);
+        assert_eq!(terrain.frame().origin(), DVec2::new(0.5, 1.5));
+        assert!(terrain.notes().iter().any(|n| n.contains("georeferenced")));
+        fs::write(path.with_extension("tfw"), "5\n0\n0\n-5\n1002.5\n2002.5\n").unwrap();
+        let terrain = crate::Terrain::open(&path).unwrap();
+        assert_eq!(terrain.frame().origin(), DVec2::new(1002.5, 2002.5));
+        assert_eq!(terrain.frame().step(), DVec2::splat(5.0));
+        assert_eq!(terrain.heights(), [1.0, 2.0, 3.0, 4.0]);
+    }
+
+    #[test]
+    fn degrees_without_a_crs_are_taken_for_degrees() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dem.asc");
+        let header =
+            "ncols 2\nnrows 2\nxllcorner -118.2\nyllcorner 34.6\ncellsize 0.0008333\n1 2 3 4";
+        fs::write(&path, header).unwrap();
+        let terrain = crate::Terrain::open(&path).unwrap();
+        assert_eq!(terrain.crs().epsg(), Some(4326));
+        assert!(terrain.notes().iter().any(|n| n.contains("degrees")));
+    }
+}
