@@ -1,7 +1,67 @@
-//! Ridgeway plans routes over terrain by anisotropic geodesic distance.
+//! Ridgeway plans routes over terrain by *anisotropic geodesic* distance.
+//!
+//! Ordinary geodesics only shorten. On the curvature metric a step is dear where the ground bends along it, so
+//! routes keep to valleys, ridges and hillsides, as mountain roads do. The method is that of Seong, Jeong and
+//! Cohen, *Anisotropic Geodesic Distance Computation for Parametric Surfaces* (SMI 2008).
+//!
+//! # A tour, in the order the data flows
+//!
+//! ```text
+//! terrain ──▶ surface ──▶ metric ──▶ eikonal ──▶ route ──▶ export, render
+//! heights     z(x, y),    D at any   g, the      a line,   GeoJSON, GPX, CSV,
+//! in metres   exact       point      distance    numbers   GeoTIFF, PNG
+//!             derivatives
+//! ```
+//!
+//! ```
+//! use ridgeway::route::trace;
+//! use ridgeway::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Terrain};
+//!
+//! # fn main() -> Result<(), ridgeway::Error> {
+//! let control = Control::default();
+//! let terrain = Terrain::open("data/jacksboro.tif")?;
+//! let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control)?;
+//! let metric = Metric::Curvature(Default::default()).on(&surface, &Modifiers::default())?;
+//!
+//! let start = terrain.frame().to_grid(glam::DVec2::new(-84.30, 36.60));
+//! let goal = terrain.frame().to_grid(glam::DVec2::new(-83.90, 36.35));
+//! let distance = Solver::default().solve(&metric, &start.into(), &[goal], &control)?;
+//! let route = trace(&distance, &metric, goal)?;
+//! assert!(route.summary.length_m > 45_000.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! * [`terrain`]: [`Terrain::open`] reads GeoTIFF, ESRI ASCII grids and SRTM tiles; [`terrain::synthetic`] makes terrains
+//!   with known answers. Heights are metres, voids `NaN`, row 0 is north.
+//! * [`surface`]: [`HeightSurface::fit`] makes the tensor-product B-spline `z(x, y)`; a [`HeightJet`] is its value and
+//!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape.
+//! * [`metric`]: [`Metric::on`] binds a metric to a surface: [`MetricField::speed`] is the tensor `D` there.
+//! * [`eikonal`]: [`Solver::solve`] solves `√(∇gᵀ D ∇g) = 1` from a [`StartRegion`] into a [`DistanceMap`].
+//! * [`route`]: [`route::trace`] descends on `g` from the goal; a [`Route`] carries its numbers; [`Comparison`] sets several
+//!   metrics side by side.
+//! * [`export`], [`render`]: files and pictures.
+//!
+//! # Units, frames, signs
+//!
+//! | quantity | unit | frame and sign |
+//! |---|---|---|
+//! | grid coordinates | nodes | `(column, row)` from the north-west node, row southward ([`GridFrame`]) |
+//! | map coordinates | those of the CRS | x east, y north |
+//! | heights, lengths | m | also on a DEM in degrees or feet |
+//! | derivatives of height | 1, 1/m | ground axes: x east, y **north** |
+//! | curvature `κ` | 1/m | positive where the ground bends towards the upward normal: a hollow |
+//! | speed tensor `D`, metric `M = D⁻¹` | | ground axes; large `D` = fast = short |
+//! | distance `g` | m, or AG units for the curvature metric | 0 on the start region |
+//!
+//! Work runs on the current rayon pool, and no result depends on the number of threads, not in one bit.
+//! Nothing panics on data; see [`Error`].
+//!
+//! # Features
+//!
+//! * `cli` (default): the `ridgeway` command. A library user can do without: `default-features = false`.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
-#![allow(unused, clippy::todo, reason = "skeleton")]
 
 mod control;
 pub mod eikonal;
@@ -17,7 +77,7 @@ pub mod terrain;
 pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{DistanceMap, Solver, StartRegion};
 pub use error::{Error, Result};
-pub use grid::{GridFrame, Ground};
+pub use grid::{Ground, GridFrame};
 pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
 pub use route::{Comparison, Route};
 pub use surface::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};

@@ -3,7 +3,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use ridgeway::export::{Band, GeoKeys, Samples, check_free, write_file, write_geotiff};
+use ridgeway::export::{Band, Samples, check_free, write_file, write_geotiff};
+use ridgeway::terrain::GeoKeys;
 use ridgeway::{Error, Result, Terrain};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can

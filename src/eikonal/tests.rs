@@ -163,7 +163,7 @@ fn goals_end_the_solve_early_with_final_values() {
 #[test]
 fn thread_count_changes_no_bit() {
     let tensor = |c: usize, r: usize| {
-        let void = (c / 9 + r / 7) % 5 == 0 && c % 9 < 6;
+        let void = (c / 9 + r / 7).is_multiple_of(5) && c % 9 < 6;
         (!void).then(|| rotated(1.0 + (c % 50) as f64, r as f64 * 0.1) * (1.0 + (r % 30) as f64))
     };
     let run = |threads| {

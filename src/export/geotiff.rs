@@ -16,6 +16,7 @@ use tiff::tags::{
 use tiff::{TiffError, TiffResult};
 
 use crate::GridFrame;
+use crate::terrain::GeoKeys;
 
 /// Side of a tile in pixels, GDAL's default.
 const TILE: usize = 256;
@@ -49,17 +50,6 @@ pub enum Samples<'a> {
     U32(&'a [u32]),
     /// Classes; 0 is nodata.
     U8(&'a [u8]),
-}
-
-/// The GeoTIFF keys of a CRS; empty for none.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GeoKeys {
-    /// `GeoKeyDirectoryTag`.
-    pub directory: Vec<u16>,
-    /// `GeoDoubleParamsTag`.
-    pub doubles: Vec<f64>,
-    /// `GeoAsciiParamsTag`.
-    pub ascii: String,
 }
 
 impl GeoKeys {
