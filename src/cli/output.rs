@@ -87,11 +87,7 @@ pub(crate) fn write_raster(
 ) -> Result<()> {
     let crs = terrain.crs();
     let keys = match (crs.geo_keys(), crs.epsg()) {
-        (Some(keys), _) => GeoKeys {
-            directory: keys.directory.clone(),
-            doubles: keys.doubles.clone(),
-            ascii: keys.ascii.clone(),
-        },
+        (Some(keys), _) => keys.clone(),
         (None, Some(code)) => GeoKeys::from_epsg(code, crs.is_geographic()),
         (None, None) => GeoKeys::default(),
     };

@@ -236,10 +236,13 @@ fn check_open<'s>(
 fn tensors(path: &Path, terrain: &Terrain) -> Result<Arc<[Sym2]>> {
     let raster = read_bands(path)?;
     let [xx, xy, yy] = &raster.bands[..] else {
-        let found = raster.bands.len();
+        let found = match raster.bands.len() {
+            1 => "1 band".into(),
+            bands => format!("{bands} bands"),
+        };
         return Err(Error::format(
             path,
-            format!("has {found} bands; a tensor raster has three: D11, D12, D22"),
+            format!("has {found}; a tensor raster has three: D11, D12, D22"),
         ));
     };
     let (theirs, ours) = (&raster.frame, terrain.frame());
