@@ -4,8 +4,8 @@ use glam::DVec2;
 use tiny_skia::Pixmap;
 
 use super::canvas::{self, Rgb};
-use super::map::number;
 use super::sheet::{Item, SIDE, Sheet};
+use super::text::number;
 use crate::export::round_step;
 use crate::{Error, GridFrame, Result};
 
@@ -181,6 +181,7 @@ mod tests {
     fn ticks_are_round_and_inside() {
         let shown: Vec<_> = ticks(-0.3, 1.0).into_iter().map(|t| t.1).collect();
         assert_eq!(shown, ["0", "0.5", "1"]);
+        assert_eq!(ticks(0.001, 1.0)[0], (0.0, "0".into()));
         assert!(ticks(0.0, 1.0).iter().all(|t| (0.0..=1.0).contains(&t.0)));
     }
 

@@ -184,7 +184,12 @@ fn draw_isolines(sheet: &mut Sheet, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>>
         let (width, opacity) = if major { (2.2, 0.8) } else { (1.1, 0.6) };
         sheet.canvas.lines(&lines, width * sheet.unit, layer.colour, opacity);
         if major && let Some(longest) = lines.iter().max_by_key(|line| line.len()) {
-            labels.push(label_places(longest, &number(isoline.level), layer.colour, sheet.unit));
+            labels.push(label_places(
+                longest,
+                &text::number(isoline.level),
+                layer.colour,
+                sheet.unit,
+            ));
         }
     }
     labels
@@ -219,20 +224,6 @@ fn draw_labels(sheet: &mut Sheet, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
             drawn.push(label);
         }
     }
-}
-
-/// A number with at most four significant digits and no trailing zeros.
-pub(super) fn number(value: f64) -> String {
-    if value == 0.0 {
-        return "0".into();
-    }
-    let magnitude = value.abs().log10().floor() as i32;
-    if !(-4..7).contains(&magnitude) {
-        return format!("{value:.2e}");
-    }
-    let decimals = (3 - magnitude).clamp(0, 9) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
 }
 
 #[cfg(test)]
@@ -300,13 +291,5 @@ mod tests {
         let mut map = MapPicture::new(&frame, &[0.0; 9]);
         map.max_side_px = 1 << 20;
         assert!(map.render().is_err());
-    }
-
-    #[test]
-    fn numbers_are_short() {
-        assert_eq!(number(12_500.0), "12500");
-        assert_eq!(number(0.25), "0.25");
-        assert_eq!(number(-3.0), "-3");
-        assert_eq!(number(2.5e-7), "2.50e-7");
     }
 }

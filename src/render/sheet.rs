@@ -188,8 +188,10 @@ fn flow(items: &mut [Item], inner: f32, unit: f32, metres_per_pixel: f64) -> Vec
 impl Item {
     fn label(&self) -> String {
         match self {
-            Self::Scale { metres } if *metres >= 1000.0 => format!("{} km", metres / 1000.0),
-            Self::Scale { metres } => format!("{metres} m"),
+            Self::Scale { metres } if *metres >= 1000.0 => {
+                format!("{} km", text::number(metres / 1000.0))
+            }
+            Self::Scale { metres } => format!("{} m", text::number(*metres)),
             Self::North => "N".into(),
             Self::Line { label, .. }
             | Self::Pin { label, .. }
@@ -214,7 +216,7 @@ impl Item {
     }
 
     fn shorten(&mut self, inner: f32, unit: f32) {
-        let room = inner - self.symbol(unit, 1.0).min(420.0 * unit) - 10.0 * unit;
+        let room = inner - self.symbol(unit, 1.0) - 10.0 * unit;
         if let Self::Line { label, .. }
         | Self::Pin { label, .. }
         | Self::Patch { label, .. }

@@ -86,6 +86,20 @@ fn push_curves(
     }
 }
 
+/// A number to four significant digits (whole ones are all kept), without trailing zeros.
+pub(super) fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    if !(-4..7).contains(&magnitude) {
+        return format!("{value:.2e}");
+    }
+    let decimals = (3 - magnitude).clamp(0, 9) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,5 +115,13 @@ mod tests {
         assert!((bounds.bottom() - 50.0).abs() < 0.5 && bounds.left() > 10.0);
         // Capital height of DejaVu Sans: 0.729 em.
         assert!((bounds.height() - 14.58).abs() < 0.1, "{}", bounds.height());
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        assert_eq!(number(12_500.0), "12500");
+        assert_eq!(number(0.25), "0.25");
+        assert_eq!(number(-3.0), "-3");
+        assert_eq!(number(2.5e-7), "2.50e-7");
     }
 }

@@ -91,15 +91,20 @@ impl Crs {
                  `gdalwarp -t_srs EPSG:...` to one that is, such as the UTM zone"
                 ))
             })?;
-        let mut crs = Self::from_proj(definition.proj4, wkt_name(definition.wkt))?;
-        crs.epsg = Some(code);
-        if let Some((unit, size)) = wkt_unit(definition.wkt) {
-            if crs.is_geographic() && (size - 1f64.to_radians()).abs() > 1e-9 {
-                return Err(Error::usage(format!(
-                    "EPSG:{code} counts angles in {unit}, not degrees; reproject with `gdalwarp -t_srs EPSG:4326`"
-                )));
+        let (name, wkt) = (wkt_name(definition.wkt), definition.wkt);
+        let mut crs = match (Self::from_proj(definition.proj4, name), wkt_unit(wkt)) {
+            (Ok(crs), _) => crs,
+            // A projection that is not at hand: no way to longitude and latitude, but distances are right.
+            (Err(_), Some((unit, size))) if wkt.starts_with("PROJCS") => {
+                Self::named(name, unit, size)
             }
-            crs.unit = unit.to_owned();
+            (Err(e), _) => return Err(e),
+        };
+        crs.epsg = Some(code);
+        if crs.is_geographic() && wkt.contains("UNIT[\"grad\"") {
+            return Err(Error::usage(format!(
+                "EPSG:{code} counts angles in grads, not degrees; reproject with `gdalwarp -t_srs EPSG:4326`"
+            )));
         }
         if code == 3857 {
             crs.ground = Ground::WebMercator;
@@ -153,24 +158,26 @@ impl Crs {
         Ok(Self { keys: Some(Arc::new(keys.horizontal())), ..crs })
     }
 
-    /// The CRS of well-known text, as in a `.prj` file: by its EPSG code, by a UTM zone in its name, or else
-    /// by name and unit only.
+    /// The CRS of well-known text, as in a `.prj` file: by its EPSG code, by a name that tells one, or else by
+    /// its ellipsoid or unit only.
     pub(super) fn from_wkt(wkt: &str) -> Result<Self> {
-        let name = wkt_name(wkt);
-        let code = wkt_authority(wkt).or_else(|| code_of_name(name));
+        let (name, wkt) = (wkt_name(wkt), wkt.trim_start());
+        let size = wkt_unit(wkt).map_or(0.0, |(_, size)| size);
+        let geographic = wkt.starts_with("GEOG") && (size - 1f64.to_radians()).abs() < 1e-9;
+        let code = wkt_authority(wkt).or_else(|| match geographic {
+            true => geographic_code(name),
+            false => utm_code(name).filter(|_| size == 1.0),
+        });
         if let Some(crs) = code.and_then(|code| Self::from_epsg(code).ok()) {
             return Ok(crs);
         }
+        if let (true, Some(ellipsoid)) = (geographic, wkt_ellipsoid(wkt)) {
+            return Self::from_proj(&format!("+proj=longlat {ellipsoid}"), name);
+        }
         match wkt_unit(wkt) {
-            Some((unit, size)) if wkt.trim_start().starts_with("PROJ") && size > 0.0 => {
+            Some((unit, size)) if wkt.starts_with("PROJ") && size.is_finite() && size > 0.0 => {
                 Ok(Self::named(name, unit, size))
             }
-            Some((_, size)) if (size - 1f64.to_radians()).abs() < 1e-9 => Ok(Self {
-                caveat: Some(
-                    "its datum is taken as WGS84; places may be some hundred metres off".to_owned(),
-                ),
-                ..Self::from_proj("+proj=longlat +datum=WGS84", name)?
-            }),
             _ => Err(Error::usage(
                 "the CRS description names no EPSG code and no unit that is understood; replace it by the WKT that \
                  `gdalsrsinfo -o wkt1 EPSG:...` prints, or remove it to have map units taken as metres",
@@ -301,7 +308,8 @@ fn wrap_degrees(lon: f64) -> f64 {
 
 /// Puts mean datum shifts in the place of grid files that are not at hand, and says what that costs.
 fn without_shift_grids(definition: &str) -> (String, Option<String>) {
-    /// What to replace, by what, and the caveat. NAD27: EPSG transformation 1173; NZGD49: EPSG 1564.
+    /// What to replace, by what, and the caveat. NAD27: EPSG transformation 1173. NZGD49: the
+    /// definitions give a seven-parameter shift besides the grid.
     const SHIFTS: [(&str, &str, &str); 3] = [
         (
             "+datum=NAD27",
@@ -311,7 +319,7 @@ fn without_shift_grids(definition: &str) -> (String, Option<String>) {
         ),
         (
             "+nadgrids=nzgd2kgrid0005.gsb",
-            "+towgs84=59.47,-5.04,187.44,0.47,-0.1,1.024,-4.5993",
+            "",
             "longitudes and latitudes from NZGD49 use its mean shift, good to about 4 m",
         ),
         (
@@ -377,30 +385,33 @@ fn wkt_authority(wkt: &str) -> Option<u32> {
     (rest.trim_start_matches('"').trim() == "]]").then(|| code.parse().ok()).flatten()
 }
 
-/// EPSG code of a name such as `WGS_1984_UTM_Zone_11N`, `NAD27 / UTM zone 10N` or `GCS_WGS_1984`.
-fn code_of_name(name: &str) -> Option<u32> {
-    let name = name.to_ascii_uppercase().replace('_', " ");
-    let datum =
-        |list: &[(&str, u32)]| list.iter().find(|(d, _)| name.contains(d)).map(|(_, code)| *code);
-    let Some((_, zone)) = name.split_once("UTM ZONE ") else {
-        let geographic = name.starts_with("GCS ") || !name.contains(" / ");
-        return geographic
-            .then(|| {
-                datum(&[
-                    ("WGS 1984", 4326),
-                    ("WGS 84", 4326),
-                    ("NORTH AMERICAN 1983", 4269),
-                    ("ETRS 1989", 4258),
-                ])
-            })
-            .flatten();
-    };
-    let digits = zone.find(|c: char| !c.is_ascii_digit()).unwrap_or(zone.len());
-    let number: u32 = zone[..digits].parse().ok().filter(|n| (1..=60).contains(n))?;
-    if zone[digits..].trim_start().starts_with('S') {
-        return datum(&[("WGS 84", 32700), ("WGS 1984", 32700)]).map(|base| base + number);
-    }
-    let bases = [
+/// The `SPHEROID["name",a,1/f` of well-known text in PROJ.4 notation.
+fn wkt_ellipsoid(wkt: &str) -> Option<String> {
+    let (_, spheroid) = wkt.split_once("SPHEROID[").or_else(|| wkt.split_once("ELLIPSOID["))?;
+    let mut numbers = spheroid.split([',', ']']).skip(1).map(|t| t.trim().parse::<f64>().ok());
+    let a = numbers.next()??;
+    let inverse_flattening = numbers.next()??;
+    Some(if inverse_flattening > 1.0 {
+        format!("+a={a} +rf={inverse_flattening}")
+    } else {
+        format!("+R={a}")
+    })
+}
+
+/// EPSG code of a geographic CRS by a name such as `GCS_WGS_1984`.
+fn geographic_code(name: &str) -> Option<u32> {
+    Some(match name {
+        "GCS_WGS_1984" | "WGS 84" => 4326,
+        "GCS_North_American_1983" | "NAD83" => 4269,
+        "GCS_North_American_1927" | "NAD27" => 4267,
+        "GCS_ETRS_1989" | "ETRS89" => 4258,
+        _ => return None,
+    })
+}
+
+/// EPSG code of a UTM zone by a name such as `WGS_1984_UTM_Zone_11N` or `NAD27 / UTM zone 10N`.
+fn utm_code(name: &str) -> Option<u32> {
+    const DATUMS: [(&str, u32); 8] = [
         ("WGS 84", 32600),
         ("WGS 1984", 32600),
         ("NAD83", 26900),
@@ -410,7 +421,18 @@ fn code_of_name(name: &str) -> Option<u32> {
         ("ETRS89", 25800),
         ("ETRS 1989", 25800),
     ];
-    datum(&bases).map(|base| base + number)
+    let name = name.to_ascii_uppercase().replace('_', " ");
+    let (datum, zone) = name.split_once("UTM ZONE ")?;
+    let datum = datum.trim_end_matches([' ', '/']);
+    let (_, base) = DATUMS.iter().find(|(name, _)| *name == datum)?;
+    let (number, hemisphere) =
+        zone.trim_end().split_at_checked(zone.trim_end().len().checked_sub(1)?)?;
+    let number: u32 = number.parse().ok().filter(|n| (1..=60).contains(n))?;
+    match hemisphere {
+        "N" => Some(base + number),
+        "S" if *base == 32600 => Some(32700 + number),
+        _ => None,
+    }
 }
 
 /// Value of a key whose meaning the file spells out itself.
@@ -721,6 +743,12 @@ mod tests {
         );
         assert_eq!(code(r#"PROJCS["WGS_1984_UTM_Zone_19S",UNIT["Meter",1.0]]"#), Some(32719));
         assert_eq!(code(r#"GEOGCS["GCS_WGS_1984",UNIT["Degree",0.0174532925199433]]"#), Some(4326));
+        let code_or_none = |wkt: &str| Crs::from_wkt(wkt).ok().and_then(|crs| crs.epsg());
+        assert_eq!(code_or_none(r#"PROJCS["WGS 84 Lambert",UNIT["Meter",1.0]]"#), None);
+        assert_eq!(code_or_none(r#"PROJCS["NAD_1983_UTM_Zone_11N",UNIT["Foot_US",0.3048]]"#), None);
+        let moon = r#"GEOGCS["GCS_Moon",SPHEROID["Moon",1737400.0,0.0],UNIT["Degree",0.0174532925199433]]"#;
+        let sphere = Ground::Ellipsoid { semi_major: 1_737_400.0, flattening: 0.0 };
+        assert_eq!(Crs::from_wkt(moon).unwrap().ground(), sphere);
         // The code of a part is not the code of the whole.
         let local =
             r#"PROJCS["Site grid",GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]],UNIT["foot",0.3048]]"#;
