@@ -82,12 +82,12 @@ impl Axis {
         penalty
     }
 
-    /// A cut-off of `cells` nodes, in knot intervals, kept where the equations are sound.
-    fn cutoff(&self, cells: f64) -> f64 {
+    /// A cut-off of `cells` nodes, kept where the equations are sound.
+    pub(super) fn cutoff(&self, cells: f64) -> f64 {
         // Fewer knots than nodes without smoothing may leave a coefficient almost without data where
         // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and is not felt otherwise.
         let shortest = if self.basis.len() < self.nodes.len() { 0.3 } else { 0.0 };
-        (cells * self.basis.density()).clamp(shortest, LONGEST_CUTOFF)
+        cells.clamp(shortest / self.basis.density(), LONGEST_CUTOFF / self.basis.density())
     }
 
     /// `λ` for a cut-off of `cells` nodes: the quotient of the symbols of normal and penalty matrix at that wave,
@@ -99,7 +99,7 @@ impl Axis {
     /// with `r = 1` for degree 3 and `r = b` for degree 5, from third differences and the products of the
     /// B-splines they are coefficients of. For long waves it is `(L/2π)⁶`.
     fn smoothing(&self, cells: f64) -> f64 {
-        let cutoff = self.cutoff(cells);
+        let cutoff = self.cutoff(cells) * self.basis.density();
         // No wave on the knots is shorter than two of them.
         let wave = cutoff.max(2.0);
         let omega = TAU / wave;
@@ -158,22 +158,15 @@ impl Axis {
         sums
     }
 
-    /// Heights of the fit to the finite values of a line, at all its nodes; `None` if there are none.
-    ///
-    /// With few values a lower derivative is penalised, so that what lies beyond them is a line or a
-    /// constant and not a parabola through noise.
+    /// Heights at all nodes of the fit to the finite heights of a line; `penalty` is that of the
+    /// derivative `order`.
     pub(super) fn complete(
         &self,
-        penalties: &[Banded; 3],
+        penalty: &Banded,
+        order: i32,
         cells: f64,
         line: &[f64],
-    ) -> Option<Vec<f64>> {
-        let order = match line.iter().filter(|z| z.is_finite()).count() {
-            0 => return None,
-            1 => 1,
-            2..=5 => 2,
-            _ => 3,
-        };
+    ) -> Vec<f64> {
         let support = self.basis.support();
         let mut normal = Banded::zero(self.basis.len());
         let mut x = vec![[0.0]; self.basis.len()];
@@ -182,11 +175,10 @@ impl Axis {
             normal.add_outer(node.start, weights, 1.0);
             x[node.start..].iter_mut().zip(weights).for_each(|([x], w)| *x += w * z);
         }
-        let length = self.cutoff(cells) / self.basis.density() / TAU;
-        normal.add(&penalties[order - 1], length.powi(2 * order as i32));
+        normal.add(penalty, (self.cutoff(cells) / TAU).powi(2 * order));
         normal.factor(support - 1).solve(&mut x);
         let x = x.as_flattened();
-        Some(self.nodes.iter().map(|n| dot(&n.weights[0][..support], &x[n.start..])).collect())
+        self.nodes.iter().map(|n| dot(&n.weights[0][..support], &x[n.start..])).collect()
     }
 }
 

@@ -648,6 +648,29 @@ mod tests {
     }
 
     #[test]
+    fn wide_voids_stay_within_bounds() {
+        // Half of the grid missing, on the side where elimination begins and on the other.
+        let frame = unit_frame(1500, 9);
+        let truth = sample(&frame, |c, r| 100.0 * (c * 0.05).sin() + r);
+        for missing in [0.0..900.0, 600.0..1500.0, 200.0..1400.0] {
+            let heights: Vec<f64> = (0..truth.len())
+                .map(|i| if missing.contains(&((i % 1500) as f64)) { f64::NAN } else { truth[i] })
+                .collect();
+            for degree in DEGREES {
+                for cells in [0.5, 2.0, 4.0, 7.0, 16.0, 64.0, 1e3, 1e9] {
+                    let surface = fit(&frame, &heights, degree, Smoothing::CutoffCells(cells));
+                    for jet in jets(&surface) {
+                        assert!(jet.z.abs() < 400.0, "{degree:?} {cells} {missing:?} {jet:?}");
+                    }
+                    assert!(surface.residuals().rms < 110.0);
+                }
+                let surface = fit(&frame, &heights, degree, Smoothing::Interpolate);
+                assert!(surface.residuals().max < 1e-9);
+            }
+        }
+    }
+
+    #[test]
     fn a_single_height_makes_a_level_surface() {
         let frame = unit_frame(7, 5);
         let mut heights = vec![f64::NAN; 35];
@@ -700,6 +723,14 @@ mod tests {
                 assert!(before < 600, "{before}");
             }
         }
+    }
+
+    #[test]
+    fn a_tolerance_is_met_on_oblong_cells() {
+        let frame =
+            GridFrame::new(60, 30, DVec2::ZERO, DVec2::new(1.0, 50.0), Ground::METRES).unwrap();
+        let surface = fit(&frame, &noise(1800), Degree::Cubic, Smoothing::Tolerance(1e-6));
+        assert!(surface.residuals().rms <= 1e-6, "{:?}", surface.residuals());
     }
 
     #[test]

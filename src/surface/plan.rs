@@ -39,7 +39,7 @@ impl Plan {
         Self { degree, intervals, cutoff }
     }
 
-    /// About square knot intervals, `longer` of them along the longer side; no smoothing.
+    /// About square knot intervals, `longer` of them along the side that is longer in metres; no smoothing.
     pub(super) fn coarse(frame: &GridFrame, degree: usize, longer: usize) -> Self {
         let most = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
         let extent = most * frame.mid_spacing();
@@ -65,8 +65,12 @@ pub(super) fn fewest_knots(
 ) -> Result<Plan> {
     let quiet = Control { cancel: control.cancel.clone(), progress: None };
     let filled = fill(frame, heights, &Plan::every_node(frame, degree), &quiet)?;
-    // Knots at every node interpolate, so the upper end always meets the tolerance.
-    let (mut few, mut enough) = (0, frame.cols().max(frame.rows()) - 1);
+    // As many intervals as the finer cells fit along the longer side: knots at every node, which
+    // interpolate, so the upper end always meets the tolerance.
+    let cells = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
+    let spacing = frame.mid_spacing();
+    let finest = (cells * spacing).max_element() / spacing.min_element();
+    let (mut few, mut enough) = (0, finest.ceil() as usize);
     while few < enough {
         let middle = few.midpoint(enough);
         let plan = Plan::coarse(frame, degree, middle);

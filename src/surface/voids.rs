@@ -4,7 +4,7 @@
 //! The first guess continues the data along rows and along columns by one-dimensional fits without
 //! weight in the voids. Refitting with the fitted heights in the voids then leads to the fit without
 //! weight in all of them (the EM algorithm; Dempster, Laird and Rubin 1977): short waves in one or two
-//! rounds, long ones slowly, but those the first guess has right.
+//! rounds, long ones slowly, but those the first guess has about right.
 
 use rayon::prelude::*;
 
@@ -20,8 +20,12 @@ const ROUNDS: usize = 2;
 /// Refitting ends once no void moves by more than this share of the range of heights.
 const SETTLED: f64 = 1e-7;
 
-/// Shortest cut-off of the first guess, in cells: it must see past single noisy heights.
+/// Shortest cut-off of the first guess, in cells: it must see past single noisy heights. Interpolating
+/// SRTM with holes, the error of the curvature beside them is 4.5, 3.4 and 4.4 /km for 2, 4 and 8 cells.
 const SHORTEST_CUTOFF: f64 = 4.0;
+
+/// Cut-offs from the data beyond which a continuation is held to straight lines.
+const REACH: f64 = 4.0;
 
 /// Fits the finite heights only; at least one must be.
 pub(super) fn fit_finite(
@@ -165,23 +169,51 @@ impl Continuation {
     /// Fills the voids of a line that has data, and sets their weights: the inverse square of the
     /// distance to the nearest.
     fn fill(&self, cells: f64, line: &mut [f64], weights: &mut [f64]) {
-        if line.iter().all(|z| z.is_finite()) {
+        let finite: Vec<usize> = (0..line.len()).filter(|&i| line[i].is_finite()).collect();
+        let (Some(&first), Some(&last)) = (finite.first(), finite.last()) else { return };
+        if finite.len() == line.len() {
             return;
         }
-        let Some(values) = self.axis.complete(&self.penalties, cells, line) else { return };
-        let mut since = f64::INFINITY;
-        let mut distance = vec![f64::INFINITY; line.len()];
-        let forth_and_back = (0..line.len()).chain((0..line.len()).rev());
-        for i in forth_and_back {
-            since = if line[i].is_finite() { 0.0 } else { since + 1.0 };
-            distance[i] = distance[i].min(since);
-        }
-        for (((z, weight), value), distance) in
-            line.iter_mut().zip(weights).zip(values).zip(distance)
-        {
-            if !z.is_finite() {
-                (*z, *weight) = (value, distance.powi(-2));
+        // Far from data a free spline is a parabola of rounding errors: hold it to straight lines there.
+        let reach = (REACH * self.axis.cutoff(cells)).ceil() as usize;
+        let mut held = line.to_vec();
+        for i in 0..first {
+            weights[i] = inverse_square(first - i);
+            if first - i > reach {
+                held[i] = line[first];
             }
         }
+        for pair in finite.windows(2) {
+            let (a, b) = (pair[0], pair[1]);
+            for i in a + 1..b {
+                let distance = (i - a).min(b - i);
+                weights[i] = inverse_square(distance);
+                if distance > reach {
+                    let share = (i - a) as f64 / (b - a) as f64;
+                    held[i] = line[a] + share * (line[b] - line[a]);
+                }
+            }
+        }
+        for i in last + 1..line.len() {
+            weights[i] = inverse_square(i - last);
+            if i - last > reach {
+                held[i] = line[last];
+            }
+        }
+        // With few heights a lower derivative is penalised, so that what lies beyond them is a constant or
+        // a line and not a parabola through noise.
+        let order = match finite.len() {
+            1 => 1,
+            2..=5 => 2,
+            _ => 3,
+        };
+        let values = self.axis.complete(&self.penalties[order - 1], order as i32, cells, &held);
+        for (z, value) in line.iter_mut().zip(values).filter(|(z, _)| !z.is_finite()) {
+            *z = value;
+        }
     }
+}
+
+fn inverse_square(distance: usize) -> f64 {
+    (distance as f64).powi(-2)
 }
