@@ -125,6 +125,18 @@ fn info_tells_people_and_machines() {
 }
 
 #[test]
+fn info_announces_the_surface_that_is_fitted() {
+    let folder = Folder::new();
+    folder.write("wide.asc", "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 20\ndy 45\n1 2 3 4 5 6\n");
+    let length = |command: &str| {
+        let text = folder.good(command);
+        let line = text.lines().find(|line| line.starts_with("surface")).unwrap();
+        line.rsplit_once(' ').unwrap().0.rsplit_once(' ').unwrap().1.to_owned()
+    };
+    assert_eq!(length("info wide.asc"), length("surface wide.asc"));
+}
+
+#[test]
 fn synth_lists_its_kinds_and_repeats_itself() {
     let folder = Folder::new();
     let list = folder.good("synth --list");

@@ -362,6 +362,15 @@ pub(crate) enum DegreeName {
     Quintic,
 }
 
+impl DegreeName {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Cubic => "cubic",
+            Self::Quintic => "quintic",
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Layer {
     /// Height, m.

@@ -9,6 +9,7 @@ use glam::DVec2;
 use ridgeway::{Error, GridFrame, Result, StartRegion, Terrain};
 
 use crate::args::pair;
+use crate::report::coordinate;
 
 /// A place as the user wrote it.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,15 +93,8 @@ impl Notation {
             }
             Self::Pixel => (grid, 1.0),
         };
-        let decimals = (2.0 - cell.log10()).ceil().clamp(0.0, 12.0) as usize;
-        let number = |v: f64| {
-            let text = format!("{v:.decimals$}");
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-                false => text,
-            }
-        };
-        Ok(format!("{}{},{}", self.prefix(), number(at.x), number(at.y)))
+        let [x, y] = at.to_array().map(|value| coordinate(value, cell));
+        Ok(format!("{}{x},{y}", self.prefix()))
     }
 }
 

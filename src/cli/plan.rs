@@ -175,8 +175,7 @@ pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
 
 /// The surface that was fitted, in words.
 pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
-    let options = args.options();
-    let how = match (options.smoothing, surface.cutoff()) {
+    let how = match (args.options().smoothing, surface.cutoff()) {
         (Smoothing::Interpolate, _) => "through every height".into(),
         (Smoothing::Tolerance(tolerance), _) => format!("within {tolerance} m (root mean square)"),
         (Smoothing::Auto, Some(cutoff)) => {
@@ -185,7 +184,7 @@ pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
         (_, Some(cutoff)) => format!("cut-off {}", report::metres(cutoff)),
         (_, None) => "smoothed".into(),
     };
-    format!("{:?} B-spline, {how}", options.degree).to_lowercase().replace("b-s", "B-s")
+    format!("{} B-spline, {how}", args.degree.name())
 }
 
 /// The cells of `--barrier`, if there are any.
