@@ -77,7 +77,7 @@ pub(crate) struct RunArgs {
     #[arg(long, global = true)]
     pub(crate) json: bool,
     /// Number of threads; no result depends on it [default: all processors].
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
 }
 
@@ -165,7 +165,7 @@ pub(crate) struct DistanceArgs {
     #[arg(long, value_enum, value_name = "METRIC")]
     pub(crate) metric: Option<MetricName>,
     /// The GeoTIFF to write; cells that cannot be reached are nodata.
-    #[arg(short, long, value_name = "FILE.tif", required_unless_present_any = ["isolines", "stats", "goal"])]
+    #[arg(short, long, value_name = "FILE.tif")]
     pub(crate) output: Option<PathBuf>,
     /// Replace files that exist.
     #[arg(long)]
@@ -259,7 +259,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_enum, default_value_t = Picture::Hillshade)]
     pub(crate) layer: Picture,
     /// Length of the longer side in pixels.
-    #[arg(long, value_name = "PIXELS", default_value_t = 1600, value_parser = clap::value_parser!(u32).range(64..=16384))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1600, value_parser = clap::value_parser!(u32).range(100..=8192))]
     pub(crate) width: u32,
     /// Draw routes from here.
     #[arg(long, value_name = "PLACE", requires = "goal", allow_hyphen_values = true)]
@@ -362,6 +362,15 @@ pub(crate) enum DegreeName {
     Quintic,
 }
 
+impl DegreeName {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Cubic => "cubic",
+            Self::Quintic => "quintic",
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Layer {
     /// Height, m.
@@ -419,11 +428,19 @@ fn slope(text: &str) -> Result<f64, String> {
     number(text, |v| v > 0.0 && v <= 90.0, "an angle above 0 and up to 90 degrees")
 }
 
+/// Most cells of a synthetic terrain: 2 GB of heights.
+const MOST_CELLS: usize = 1 << 28;
+
 fn size(text: &str) -> Result<(usize, usize), String> {
     let count = |part: &str| part.trim().parse::<usize>().ok().filter(|&n| n > 0);
     text.split_once(['x', 'X', '×'])
         .and_then(|(cols, rows)| Some((count(cols)?, count(rows)?)))
-        .ok_or_else(|| "expected columns and rows, for example 301x201".into())
+        .filter(|(cols, rows)| cols.checked_mul(*rows).is_some_and(|cells| cells <= MOST_CELLS))
+        .ok_or_else(|| {
+            format!(
+                "expected columns and rows, for example 301x201, and at most {MOST_CELLS} cells"
+            )
+        })
 }
 
 fn epsg(text: &str) -> Result<u32, String> {

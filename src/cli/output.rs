@@ -98,12 +98,12 @@ pub(crate) fn write_raster(
     write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), &keys, &bands))
 }
 
-/// Writes a text file.
+/// Writes a file whose content is ready.
 ///
 /// # Errors
 /// The disk's.
-pub(crate) fn write_text(path: &Path, overwrite: bool, text: &str) -> Result<()> {
-    write_file(path, overwrite, |out| out.write_all(text.as_bytes()))
+pub(crate) fn write_content(path: &Path, overwrite: bool, content: &[u8]) -> Result<()> {
+    write_file(path, overwrite, |out| out.write_all(content))
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

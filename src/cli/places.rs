@@ -9,6 +9,7 @@ use glam::DVec2;
 use ridgeway::{Error, GridFrame, Result, StartRegion, Terrain};
 
 use crate::args::pair;
+use crate::report::coordinate;
 
 /// A place as the user wrote it.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,7 +77,7 @@ impl Notation {
     fn to_grid(self, at: DVec2, terrain: &Terrain) -> Result<DVec2> {
         match self {
             Self::Map => Ok(terrain.frame().to_grid(at)),
-            Self::LonLat => lonlat_to_grid(at, terrain),
+            Self::LonLat => terrain.from_lonlat(at),
             Self::Pixel => Ok(at),
         }
     }
@@ -88,19 +89,12 @@ impl Notation {
         let (at, cell) = match self {
             Self::Map => (map, frame.step().min_element()),
             Self::LonLat => {
-                (terrain.crs().to_lonlat(map)?, frame.mid_spacing().min_element() / 111_000.0)
+                (terrain.to_lonlat(grid)?, frame.mid_spacing().min_element() / 111_000.0)
             }
             Self::Pixel => (grid, 1.0),
         };
-        let decimals = (2.0 - cell.log10()).ceil().clamp(0.0, 12.0) as usize;
-        let number = |v: f64| {
-            let text = format!("{v:.decimals$}");
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-                false => text,
-            }
-        };
-        Ok(format!("{}{},{}", self.prefix(), number(at.x), number(at.y)))
+        let [x, y] = at.to_array().map(|value| coordinate(value, cell));
+        Ok(format!("{}{x},{y}", self.prefix()))
     }
 }
 
@@ -209,8 +203,8 @@ pub(crate) fn region(
             }
             Place::File(path) => {
                 let shapes = read_shapes(path, terrain)?;
-                for &lonlat in &shapes.points {
-                    spots.push(file_spot(option, path, lonlat, terrain)?);
+                for &grid in &shapes.points {
+                    spots.push(file_spot(option, path, grid, terrain)?);
                 }
                 region.lines.extend(shapes.lines);
                 region.areas.extend(shapes.areas);
@@ -238,7 +232,7 @@ pub(crate) fn points(
 }
 
 fn file_spot(option: &'static str, path: &Path, grid: DVec2, terrain: &Terrain) -> Result<Spot> {
-    let lonlat = terrain.crs().to_lonlat(terrain.frame().to_map(grid))?;
+    let lonlat = terrain.to_lonlat(grid)?;
     let name = format!("{} (point at {:.6},{:.6})", path.display(), lonlat.x, lonlat.y);
     Spot::new(option, name, Notation::LonLat, lonlat, terrain)
 }
@@ -271,7 +265,7 @@ pub(crate) fn read_shapes(path: &Path, terrain: &Terrain) -> Result<StartRegion>
 
 fn gather(geometry: &GeometryValue, terrain: &Terrain, shapes: &mut StartRegion) -> Result<()> {
     let point = |at: &Position| match *at.as_slice() {
-        [lon, lat, ..] => lonlat_to_grid(DVec2::new(lon, lat), terrain),
+        [lon, lat, ..] => terrain.from_lonlat(DVec2::new(lon, lat)),
         _ => Err(Error::usage("a position needs two numbers")),
     };
     let line = |points: &Vec<Position>| points.iter().map(point).collect::<Result<Vec<_>>>();
@@ -294,10 +288,6 @@ fn gather(geometry: &GeometryValue, terrain: &Terrain, shapes: &mut StartRegion)
         }
     }
     Ok(())
-}
-
-fn lonlat_to_grid(lonlat: DVec2, terrain: &Terrain) -> Result<DVec2> {
-    Ok(terrain.frame().to_grid(terrain.crs().from_lonlat(lonlat)?))
 }
 
 /// The cell of a point of the grid's hull.

@@ -120,6 +120,13 @@ impl<'a> Journey<'a> {
         Ok(distance)
     }
 
+    /// Cells with a height that `field` lets nobody enter, row-major.
+    pub(crate) fn barriers(&self, field: &MetricField<'_>) -> Vec<bool> {
+        let frame = self.terrain.frame();
+        let nodes = (0..frame.rows()).flat_map(|row| (0..frame.cols()).map(move |col| (col, row)));
+        nodes.map(|(c, r)| !field.is_open(c, r) && !self.terrain.is_void(c, r)).collect()
+    }
+
     /// For [`Error::NoWay`], which metrics' distances end before the goal and where; else the error.
     ///
     /// # Errors
@@ -134,11 +141,16 @@ impl<'a> Journey<'a> {
     }
 
     /// All that is needed to make the run again, for the files it writes.
-    pub(crate) fn provenance(&self) -> Value {
+    pub(crate) fn provenance(&self, fields: &[MetricField<'_>]) -> Value {
         let metric = &self.args.metric;
         let name =
             |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let metrics: Vec<_> = fields
+            .iter()
+            .map(|f| json!({ "name": f.name(), "unit": f.unit(), "delta_per_m": f.delta() }))
+            .collect();
         json!({
+            "metrics": metrics,
             "software": format!("ridgeway {}", env!("CARGO_PKG_VERSION")),
             "command": command_line(),
             "dem": name(self.dem),
@@ -163,8 +175,7 @@ pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
 
 /// The surface that was fitted, in words.
 pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
-    let options = args.options();
-    let how = match (options.smoothing, surface.cutoff()) {
+    let how = match (args.options().smoothing, surface.cutoff()) {
         (Smoothing::Interpolate, _) => "through every height".into(),
         (Smoothing::Tolerance(tolerance), _) => format!("within {tolerance} m (root mean square)"),
         (Smoothing::Auto, Some(cutoff)) => {
@@ -173,7 +184,7 @@ pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
         (_, Some(cutoff)) => format!("cut-off {}", report::metres(cutoff)),
         (_, None) => "smoothed".into(),
     };
-    format!("{:?} B-spline, {how}", options.degree).to_lowercase().replace("b-s", "B-s")
+    format!("{} B-spline, {how}", args.degree.name())
 }
 
 /// The cells of `--barrier`, if there are any.
@@ -224,10 +235,13 @@ fn check_open<'s>(
 fn tensors(path: &Path, terrain: &Terrain) -> Result<Arc<[Sym2]>> {
     let raster = read_bands(path)?;
     let [xx, xy, yy] = &raster.bands[..] else {
-        let found = raster.bands.len();
+        let found = match raster.bands.len() {
+            1 => "1 band".into(),
+            bands => format!("{bands} bands"),
+        };
         return Err(Error::format(
             path,
-            format!("has {found} bands; a tensor raster has three: D11, D12, D22"),
+            format!("has {found}; a tensor raster has three: D11, D12, D22"),
         ));
     };
     let (theirs, ours) = (&raster.frame, terrain.frame());

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use ridgeway::{CancelToken, Control};
 
 use crate::args::RunArgs;
@@ -54,8 +54,8 @@ fn bar(patience: Duration) -> ridgeway::Progress {
                 bar.finish_and_clear();
             }
         } else if begun.elapsed() >= patience {
-            let bar =
-                current.get_or_insert_with(|| ProgressBar::new(1000).with_style(style.clone()));
+            let new = || ProgressBar::new(1000).with_style(style.clone());
+            let bar = current.get_or_insert_with(|| new().with_finish(ProgressFinish::AndClear));
             if bar.message() != stage {
                 bar.set_message(stage.to_owned());
             }

@@ -126,6 +126,16 @@ pub(crate) fn distance(value: f64, unit: &str) -> String {
     }
 }
 
+/// A coordinate, rounded to about a hundredth of a cell.
+pub(crate) fn coordinate(value: f64, cell: f64) -> String {
+    let decimals = (2.0 - cell.log10()).ceil().clamp(0.0, 12.0) as usize;
+    let text = format!("{value:.decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
 /// Four significant digits.
 pub(crate) fn digits(value: f64) -> String {
     let magnitude = value.abs().log10().floor();
@@ -149,6 +159,9 @@ mod tests {
         assert_eq!(digits(123_456.7), "123457");
         assert_eq!(digits(1.5e-9), "1.500e-9");
         assert_eq!(digits(f64::NAN), "NaN");
+        assert_eq!(coordinate(500_000.1234, 30.0), "500000.1");
+        assert_eq!(coordinate(1.0 / 1200.0, 1e-5 / 1200.0), "0.00083333333");
+        assert_eq!(coordinate(1.999_583_333, 1.0 / 1200.0), "1.999583");
         assert_eq!(metres(12_344.0), "12.34 km");
         assert_eq!(metres(823.4), "823 m");
         assert_eq!(distance(823.4, "AG units"), "823.4 AG units");

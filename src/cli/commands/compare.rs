@@ -3,18 +3,21 @@
 use std::fs;
 use std::path::Path;
 
-use ridgeway::export::{routes_geojson, write_folder, write_profiles};
+use ridgeway::export::{routes_geojson, write_folder};
 use ridgeway::{Comparison, Control, Error, MetricField, Result, Route};
 use serde_json::{Value, json};
 
-use super::render::map_picture;
-use super::route::{HEADER, measures, profile};
+use super::render;
+use super::route::{HEADER, measures, profiles};
 use crate::args::{CompareArgs, MetricName, RunArgs};
 use crate::output::check_outputs_in;
 use crate::plan::Journey;
 use crate::report::{Report, Table};
 
 const FILES: [&str; 4] = ["routes.geojson", "profile.csv", "summary.json", "map.png"];
+
+/// Length of the longer side of `map.png`.
+const PIXELS: u32 = 1600;
 
 pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Result<()> {
     if let Some(folder) = &args.output {
@@ -40,7 +43,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     if let Some(folder) = &args.output {
         control.check()?;
         write_folder(folder, args.overwrite, |folder| {
-            write_files(folder, &fields, &comparison, &summary, &journey)
+            write_files(folder, args, &fields, &comparison, &summary, &journey)
         })?;
     }
     let written = args.output.iter().map(|folder| {
@@ -100,11 +103,12 @@ fn summary(fields: &[MetricField<'_>], comparison: &Comparison, journey: &Journe
             json!({ "name": field.name(), "summary": route.summary, "costs": costs })
         })
         .collect();
-    json!({ "routes": routes, "provenance": journey.provenance() })
+    json!({ "routes": routes, "provenance": journey.provenance(fields) })
 }
 
 fn write_files(
     folder: &Path,
+    args: &CompareArgs,
     fields: &[MetricField<'_>],
     comparison: &Comparison,
     summary: &Value,
@@ -112,17 +116,16 @@ fn write_files(
 ) -> Result<()> {
     let named: Vec<(&str, &Route)> =
         fields.iter().map(MetricField::name).zip(&comparison.routes).collect();
-    let profiles: Vec<_> =
-        named.iter().map(|(name, route)| (*name, profile(route, journey))).collect();
-    let mut csv = Vec::new();
-    let write = |name: &str, content: &[u8]| {
-        let path = folder.join(name);
-        fs::write(&path, content).map_err(|source| Error::io(name, source))
-    };
-    write_profiles(&mut csv, &profiles).map_err(|source| Error::io(FILES[1], source))?;
-    let crs = journey.terrain.crs();
-    write(FILES[0], routes_geojson(&named, crs, &journey.provenance())?.as_bytes())?;
-    write(FILES[1], &csv)?;
-    write(FILES[2], format!("{summary:#}\n").as_bytes())?;
-    write(FILES[3], &map_picture(journey, &named, &comparison.distances)?)
+    let Comparison { routes, distances, .. } = comparison;
+    let geojson = routes_geojson(&named, journey.terrain.crs(), &journey.provenance(fields))?;
+    let contents = [
+        geojson.into_bytes(),
+        profiles(&named, journey)?,
+        format!("{summary:#}\n").into_bytes(),
+        render::map(journey, &args.dem, fields, routes, distances, PIXELS)?,
+    ];
+    for (name, content) in FILES.iter().zip(&contents) {
+        fs::write(folder.join(name), content).map_err(|source| Error::io(name, source))?;
+    }
+    Ok(())
 }

@@ -1,13 +1,11 @@
 //! `ridgeway distance`: the distance from the start at every cell.
 
-use std::path::Path;
-
 use ridgeway::export::{isolines, isolines_geojson, levels_by_step, round_step};
 use ridgeway::{Control, DistanceMap, MetricField, Result};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::args::{DistanceArgs, RunArgs};
-use crate::output::{check_distinct, check_file, write_raster, write_text};
+use crate::output::{check_distinct, check_file, write_content, write_raster};
 use crate::plan::Journey;
 use crate::report::{Facts, Report, distance, wrote};
 
@@ -29,13 +27,15 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     let map = journey.solve(&field, true)?;
     let values = map.to_row_major();
     control.check()?;
+    let provenance = journey.provenance(std::slice::from_ref(&field));
+    if let Some(path) = &args.isolines {
+        let content = isolines_file(args, &journey, &map, &values, &provenance)?;
+        write_content(path, args.overwrite, &content)?;
+    }
     if let Some(path) = &args.output {
         write_raster(path, args.overwrite, &journey.terrain, &bands(args, &map, values.clone()))?;
     }
-    if let Some(path) = &args.isolines {
-        write_isolines(path, args, &journey, &map, &values)?;
-    }
-    let report = report(args, &journey, &field, &map, values);
+    let report = report(args, &journey, &field, &map, values, &provenance);
     let written: String = outputs.iter().map(|path| wrote(path)).collect();
     Report { text: report.text + &written, json: report.json }.print(run)
 }
@@ -56,20 +56,19 @@ fn bands(args: &DistanceArgs, map: &DistanceMap, values: Vec<f32>) -> Vec<(Strin
     bands
 }
 
-fn write_isolines(
-    path: &Path,
+fn isolines_file(
     args: &DistanceArgs,
     journey: &Journey<'_>,
     map: &DistanceMap,
     values: &[f32],
-) -> Result<()> {
+    provenance: &Value,
+) -> Result<Vec<u8>> {
     let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let step = args.step.unwrap_or_else(|| round_step(largest.into(), ISOLINES));
     let frame = journey.terrain.frame();
     let lines = isolines(frame, values, &levels_by_step(values, step)?)?;
-    let provenance = journey.provenance();
-    let json = isolines_geojson(&lines, frame, map.unit(), journey.terrain.crs(), &provenance)?;
-    write_text(path, args.overwrite, &json)
+    let crs = journey.terrain.crs();
+    Ok(isolines_geojson(&lines, frame, map.unit(), crs, provenance)?.into_bytes())
 }
 
 fn report(
@@ -78,6 +77,7 @@ fn report(
     field: &MetricField<'_>,
     map: &DistanceMap,
     mut values: Vec<f32>,
+    provenance: &Value,
 ) -> Report {
     let nodes = values.len();
     values.retain(|v| v.is_finite());
@@ -121,7 +121,7 @@ fn report(
             "reached": values.len(),
             "distance": statistics,
             "goals": goals,
-            "provenance": journey.provenance(),
+            "provenance": provenance,
         }),
     }
 }

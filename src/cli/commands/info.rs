@@ -5,7 +5,7 @@ use serde_json::json;
 
 use crate::args::{InfoArgs, RunArgs};
 use crate::plan;
-use crate::report::{Facts, Report, digits, metres};
+use crate::report::{Facts, Report, coordinate, digits, metres};
 
 pub(super) fn run(args: &InfoArgs, run: &RunArgs) -> Result<()> {
     let terrain = plan::open(&args.dem, run)?;
@@ -17,7 +17,9 @@ fn text(args: &InfoArgs, terrain: &Terrain) -> String {
     let (frame, crs, source) = (terrain.frame(), terrain.crs(), terrain.source());
     let (step, ground) = (frame.step(), frame.mid_spacing());
     let (voids, heights) = terrain.statistics();
-    let [west, south, east, north] = extent(terrain);
+    let cell = step.min_element();
+    let [west, south, east, north] = extent(terrain).map(|edge| coordinate(edge, cell));
+    let [dx, dy] = step.to_array().map(|size| coordinate(size, 1e-5 * size));
     let mut facts = Facts::default();
     facts.add("file", args.dem.display().to_string());
     facts.add("format", format!("{}, {}", source.format, source.sample));
@@ -25,14 +27,11 @@ fn text(args: &InfoArgs, terrain: &Terrain) -> String {
     facts.add(
         "cell",
         match crs.unit() {
-            "metre" => format!("{} x {} m", step.x, step.y),
-            unit => format!(
-                "{} x {} {unit} ({} x {} m)",
-                step.x,
-                step.y,
-                digits(ground.x),
-                digits(ground.y)
-            ),
+            "metre" => format!("{dx} x {dy} m"),
+            unit => {
+                let (width, height) = (digits(ground.x), digits(ground.y));
+                format!("{dx} x {dy} {unit} ({width} x {height} m)")
+            }
         },
     );
     facts.add("CRS", crs.name());
@@ -96,16 +95,16 @@ fn extent(terrain: &Terrain) -> [f64; 4] {
 
 /// The surface that the other commands would fit with these flags.
 fn planned_fit(args: &InfoArgs, terrain: &Terrain) -> String {
-    let options = args.fit.options();
-    let how = match options.smoothing {
+    let how = match args.fit.options().smoothing {
         Smoothing::Interpolate => "through every height".into(),
         Smoothing::Cutoff(length) => format!("cut-off {}", metres(length)),
         Smoothing::CutoffCells(cells) => {
-            let cell = terrain.frame().mid_spacing().y;
-            format!("cut-off {cells} cells = {}", metres(cells * cell))
+            let cell = terrain.frame().mid_spacing();
+            let length = cells * (cell.x * cell.y).sqrt();
+            format!("cut-off {cells} cells = {}", metres(length))
         }
         Smoothing::Auto => "cut-off by cross-validation".into(),
         Smoothing::Tolerance(rms) => format!("within {rms} m (root mean square)"),
     };
-    format!("{} B-spline, {how}", format!("{:?}", options.degree).to_lowercase())
+    format!("{} B-spline, {how}", args.fit.degree.name())
 }

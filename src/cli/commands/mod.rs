@@ -26,7 +26,7 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
     let run = &cli.run;
     match &cli.command {
         Command::Info(args) => info::run(args, run),
-        Command::Synth(args) => synth::run(args, run),
+        Command::Synth(args) => synth::run(args, run, &control),
         Command::Surface(args) => surface::run(args, run, &control),
         Command::Distance(args) => distance::run(args, run, &control),
         Command::Route(args) => route::run(args, run, &control),

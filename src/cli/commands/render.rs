@@ -1,18 +1,143 @@
 //! `ridgeway render`: pictures.
 
-use ridgeway::{Control, DistanceMap, Result, Route};
+use std::path::Path;
 
-use crate::args::{RenderArgs, RunArgs};
-use crate::plan::Journey;
+use ridgeway::export::{Isoline, isolines, levels_by_step, round_step};
+use ridgeway::render::{FieldPicture, Gradient, IsolineLayer, MapPicture, Rgb, RouteLayer};
+use ridgeway::route::trace;
+use ridgeway::{Control, DistanceMap, Error, HeightSurface, MetricField, Result, Route};
+use serde_json::json;
+
+use crate::args::{Layer, Picture, RenderArgs, RunArgs};
+use crate::output::{check_file, write_content};
+use crate::plan::{self, Journey};
+use crate::report::{Report, distance, metres, wrote};
+
+/// Isolines of each distance on a map.
+const ISOLINES: usize = 20;
 
 pub(super) fn run(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<()> {
-    todo!()
+    check_file(&args.output, &["png"], args.overwrite, Some(&args.dem))?;
+    let png = match args.layer.field() {
+        None if args.start.is_empty() => relief(args, run)?,
+        None => routes(args, run, control)?,
+        Some(_) if !args.start.is_empty() => {
+            return Err(Error::usage("routes are drawn on the hillshade only; leave --layer out"));
+        }
+        Some(layer) => field(layer, args, run, control)?,
+    };
+    control.check()?;
+    write_content(&args.output, args.overwrite, &png)?;
+    Report {
+        text: wrote(&args.output),
+        json: json!({ "outputs": [args.output.display().to_string()] }),
+    }
+    .print(run)
 }
 
-pub(super) fn map_picture(
+fn relief(args: &RenderArgs, run: &RunArgs) -> Result<Vec<u8>> {
+    let terrain = plan::open(&args.dem, run)?;
+    let mut map = MapPicture::new(terrain.frame(), terrain.heights());
+    map.title = title(&args.dem);
+    map.max_side_px = args.width;
+    map.png()
+}
+
+fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
+    let terrain = plan::open(&args.dem, run)?;
+    let surface = HeightSurface::fit(&terrain, &args.ground.fit.options(), control)?;
+    let values = layer.sample(&surface);
+    let gradient = match layer {
+        Layer::Height | Layer::Slope => Gradient::Sequential,
+        _ => Gradient::Diverging,
+    };
+    let mut picture = FieldPicture::new(terrain.frame(), &values, gradient, layer.description());
+    picture.title = title(&args.dem);
+    picture.max_side_px = args.width;
+    picture.png()
+}
+
+fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
+    let places = (&args.start[..], &args.goal[..]);
+    let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    let fields = [journey.field(args.metric.unwrap_or(journey.default_metric()))?];
+    let distances = [journey.solve(&fields[0], true)?];
+    let routes = journey
+        .goals
+        .iter()
+        .map(|goal| trace(&distances[0], &fields[0], goal.at))
+        .collect::<Result<Vec<_>>>()?;
+    map(&journey, &args.dem, &fields, &routes, &distances, args.width)
+}
+
+/// A map of the terrain, the distances under `fields`, and routes of any of these metrics.
+pub(super) fn map(
     journey: &Journey<'_>,
-    routes: &[(&str, &Route)],
+    dem: &Path,
+    fields: &[MetricField<'_>],
+    routes: &[Route],
     distances: &[DistanceMap],
+    width: u32,
 ) -> Result<Vec<u8>> {
-    todo!()
+    let terrain = &journey.terrain;
+    let frame = terrain.frame();
+    let barriers = journey.barriers(&fields[0]);
+    let lines = distances
+        .iter()
+        .map(|distances| equidistant(journey, distances))
+        .collect::<Result<Vec<_>>>()?;
+    let mut map = MapPicture::new(frame, terrain.heights());
+    map.barriers = &barriers;
+    map.title = title(dem);
+    map.max_side_px = width;
+    map.starts = journey.starts.iter().map(|start| start.at).collect();
+    map.goals = journey.goals.iter().map(|goal| goal.at).collect();
+    for (field, (step, isolines)) in fields.iter().zip(&lines) {
+        let label = format!("{} distance, every {step} {}", field.name(), field.unit());
+        map.isolines.push(IsolineLayer { isolines, colour: colour(field.name()), label });
+    }
+    for route in routes {
+        let s = &route.summary;
+        let length = metres(s.length_m);
+        let label = match s.cost_unit.as_str() {
+            "m" => format!("{} route: {length}", s.metric),
+            unit => format!("{} route: {length}, {}", s.metric, distance(s.cost, unit)),
+        };
+        map.routes.push(RouteLayer { grid: &route.grid, colour: colour(&s.metric), label });
+    }
+    map.png()
+}
+
+/// About twenty isolines at round distances, and their step.
+fn equidistant(journey: &Journey<'_>, distance: &DistanceMap) -> Result<(f64, Vec<Isoline>)> {
+    let values = distance.to_row_major();
+    let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
+    let step = round_step(largest.into(), ISOLINES);
+    let levels = levels_by_step(&values, step)?;
+    Ok((step, isolines(journey.terrain.frame(), &values, &levels)?))
+}
+
+fn colour(metric: &str) -> Rgb {
+    match metric {
+        "isotropic" => Rgb::BLUE,
+        "curvature" => Rgb::ORANGE,
+        _ => Rgb::INK,
+    }
+}
+
+fn title(dem: &Path) -> String {
+    dem.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+impl Picture {
+    /// The field it shows; `None` for the shaded relief.
+    fn field(self) -> Option<Layer> {
+        match self {
+            Self::Hillshade => None,
+            Self::Height => Some(Layer::Height),
+            Self::Slope => Some(Layer::Slope),
+            Self::Mean => Some(Layer::Mean),
+            Self::Gaussian => Some(Layer::Gaussian),
+        }
+    }
 }

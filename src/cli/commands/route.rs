@@ -1,14 +1,12 @@
 //! `ridgeway route`: a route from the start to each goal.
 
-use std::path::Path;
-
-use ridgeway::export::{routes_geojson, routes_gpx, write_file, write_profiles};
+use ridgeway::export::{routes_geojson, routes_gpx, write_profiles};
 use ridgeway::route::trace;
-use ridgeway::{Control, Result, Route};
+use ridgeway::{Control, Error, Result, Route};
 use serde_json::{Value, json};
 
 use crate::args::{RouteArgs, RunArgs};
-use crate::output::{check_distinct, check_file, write_text};
+use crate::output::{check_distinct, check_file, write_content};
 use crate::plan::Journey;
 use crate::report::{Report, Table, distance, metres, wrote};
 
@@ -32,36 +30,50 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
     }
     control.check()?;
     let named: Vec<_> = routes.iter().map(|(name, route)| (name.as_str(), route)).collect();
-    for (path, format) in args.output.iter().zip(&formats) {
-        write(path, format, args.overwrite, &journey, &named)?;
+    let provenance = journey.provenance(std::slice::from_ref(&field));
+    // All contents are made before the first file is written.
+    let contents = formats
+        .iter()
+        .map(|format| content(format, &journey, &named, &provenance))
+        .collect::<Result<Vec<_>>>()?;
+    for (path, content) in args.output.iter().zip(&contents) {
+        write_content(path, args.overwrite, content)?;
     }
     let written: String = args.output.iter().map(|path| wrote(path)).collect();
-    Report { text: table(&named).to_string() + &written, json: machine(&named, &journey) }
-        .print(run)
+    let routes: Vec<_> = named
+        .iter()
+        .map(|(name, route)| json!({ "name": name, "summary": route.summary }))
+        .collect();
+    Report {
+        text: table(&named).to_string() + &written,
+        json: json!({ "routes": routes, "provenance": provenance }),
+    }
+    .print(run)
 }
 
-fn write(
-    path: &Path,
+/// The file of a format.
+fn content(
     format: &str,
-    overwrite: bool,
     journey: &Journey<'_>,
     routes: &[(&str, &Route)],
-) -> Result<()> {
+    provenance: &Value,
+) -> Result<Vec<u8>> {
     let crs = journey.terrain.crs();
-    match format {
-        "gpx" => write_text(path, overwrite, &routes_gpx(routes, crs)?),
-        "csv" => {
-            let profiles: Vec<_> =
-                routes.iter().map(|(name, route)| (*name, profile(route, journey))).collect();
-            write_file(path, overwrite, |out| write_profiles(out, &profiles))
-        }
-        _ => write_text(path, overwrite, &routes_geojson(routes, crs, &journey.provenance())?),
-    }
+    Ok(match format {
+        "gpx" => routes_gpx(routes, crs)?.into_bytes(),
+        "csv" => profiles(routes, journey)?,
+        _ => routes_geojson(routes, crs, provenance)?.into_bytes(),
+    })
 }
 
-/// The profile of a route at a step of one cell.
-pub(super) fn profile(route: &Route, journey: &Journey<'_>) -> Vec<ridgeway::route::ProfilePoint> {
-    route.profile(&journey.surface, journey.terrain.frame().mid_spacing().min_element())
+/// The profiles of routes at a step of one cell, as CSV.
+pub(super) fn profiles(routes: &[(&str, &Route)], journey: &Journey<'_>) -> Result<Vec<u8>> {
+    let step = journey.terrain.frame().mid_spacing().min_element();
+    let profiles: Vec<_> =
+        routes.iter().map(|(name, route)| (*name, route.profile(&journey.surface, step))).collect();
+    let mut csv = Vec::new();
+    write_profiles(&mut csv, &profiles).map_err(|source| Error::io("profile", source))?;
+    Ok(csv)
 }
 
 fn table(routes: &[(&str, &Route)]) -> Table {
@@ -76,7 +88,7 @@ fn table(routes: &[(&str, &Route)]) -> Table {
 
 /// Head of the columns that [`measures`] fills.
 pub(super) const HEADER: [&str; 8] =
-    ["route", "length", "climb", "descent", "max grade", "mean grade", "side slope", "total bend"];
+    ["route", "length", "climb", "descent", "max grade", "mean grade", "side slope", "∫|κn|ds"];
 
 /// The cells of a route's row.
 pub(super) fn measures(name: &str, route: &Route) -> [String; 8] {
@@ -91,13 +103,4 @@ pub(super) fn measures(name: &str, route: &Route) -> [String; 8] {
         format!("{:.1}°", s.max_side_slope_deg),
         format!("{:.2} rad", s.total_normal_curvature_rad),
     ]
-}
-
-/// The routes for machines: name and summary.
-pub(super) fn machine(routes: &[(&str, &Route)], journey: &Journey<'_>) -> Value {
-    let routes: Vec<_> = routes
-        .iter()
-        .map(|(name, route)| json!({ "name": name, "summary": route.summary }))
-        .collect();
-    json!({ "routes": routes, "provenance": journey.provenance() })
 }

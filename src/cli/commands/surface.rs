@@ -6,7 +6,7 @@ use serde_json::json;
 use crate::args::{Layer, RunArgs, SurfaceArgs};
 use crate::output::{check_file, write_raster};
 use crate::plan;
-use crate::report::{Facts, Report, digits, wrote};
+use crate::report::{Facts, Report, coordinate, digits, wrote};
 
 pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Result<()> {
     if let Some(output) = &args.output {
@@ -29,11 +29,13 @@ pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Resul
 fn report(args: &SurfaceArgs, surface: &HeightSurface) -> Report {
     let residuals = surface.residuals();
     let at = surface.frame().to_map(residuals.at);
+    let cell = surface.frame().step().min_element();
+    let [x, y] = at.to_array().map(|value| coordinate(value, cell));
     let fit = plan::describe_fit(&args.fit, surface);
     let mut facts = Facts::default();
     facts.add("surface", fit.as_str());
     facts.add("residuals", format!("{} m root mean square", digits(residuals.rms)));
-    facts.add("largest", format!("{} m at {},{}", digits(residuals.max), at.x, at.y));
+    facts.add("largest", format!("{} m at {x},{y}", digits(residuals.max)));
     facts.add("curvature", format!("{} 1/m root mean square", digits(surface.rms_curvature())));
     Report {
         text: facts.to_string() + &args.output.iter().map(|path| wrote(path)).collect::<String>(),
@@ -50,7 +52,7 @@ fn report(args: &SurfaceArgs, surface: &HeightSurface) -> Report {
 }
 
 impl Layer {
-    fn description(self) -> &'static str {
+    pub(super) fn description(self) -> &'static str {
         match self {
             Self::Height => "height (m)",
             Self::Slope => "slope (degrees)",

@@ -1,27 +1,29 @@
 //! `ridgeway synth`: synthetic terrains.
 
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
-use ridgeway::{Crs, Result, Terrain};
+use ridgeway::{Control, Crs, Result, Terrain};
 use serde_json::json;
 
 use crate::args::{RunArgs, SynthArgs};
 use crate::output::{check_file, write_raster};
-use crate::report::{Report, Table, wrote};
+use crate::report::{Facts, Report, wrote};
 
-pub(super) fn run(args: &SynthArgs, run: &RunArgs) -> Result<()> {
+pub(super) fn run(args: &SynthArgs, run: &RunArgs, control: &Control) -> Result<()> {
     // The parser asks for both unless --list is given.
     let (Some(kind), Some(output), false) = (&args.kind, &args.output, args.list) else {
         return list(run);
     };
-    let terrain = terrain(args, kind.parse()?)?;
+    let kind: SyntheticKind = kind.parse()?;
     check_file(output, &["tif", "tiff"], args.overwrite, None)?;
+    let terrain = terrain(args, kind)?;
     let heights = terrain.heights().iter().map(|&z| z as f32).collect();
+    control.check()?;
     write_raster(output, args.overwrite, &terrain, &[("height (m)".into(), heights)])?;
     let frame = terrain.frame();
     Report {
         text: wrote(output),
         json: json!({
-            "kind": kind,
+            "kind": kind.name(),
             "columns": frame.cols(),
             "rows": frame.rows(),
             "spacing_m": args.spacing,
@@ -46,11 +48,11 @@ fn terrain(args: &SynthArgs, kind: SyntheticKind) -> Result<Terrain> {
 }
 
 fn list(run: &RunArgs) -> Result<()> {
-    let mut table = Table::default();
+    let mut facts = Facts::default();
     for kind in SyntheticKind::ALL {
-        table.row([kind.name(), kind.description()]);
+        facts.add(kind.name(), kind.description());
     }
     let kinds =
         SyntheticKind::ALL.map(|k| json!({ "name": k.name(), "description": k.description() }));
-    Report { text: table.to_string(), json: json!(kinds) }.print(run)
+    Report { text: facts.to_string(), json: json!(kinds) }.print(run)
 }

@@ -1,0 +1,504 @@
+//! The `ridgeway` command as its users meet it: right uses, wrong uses, exit codes and files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use assert_cmd::cargo::cargo_bin;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A folder with inputs, in which commands run.
+struct Folder(TempDir);
+
+/// What a command did.
+#[derive(Debug)]
+struct Outcome {
+    code: i32,
+    out: String,
+    err: String,
+}
+
+impl Folder {
+    /// Holds `range.tif` (61 × 41 cells of 30 m in UTM 32N from 500000,5000000), `plain.tif` (no CRS),
+    /// `split.asc` (two halves with a column of voids between) and a wall that splits `range.tif`.
+    fn new() -> Self {
+        let folder = Self(TempDir::new().unwrap());
+        folder
+            .good("synth range --size 61x41 --crs EPSG:32632 --origin 500000,5000000 -o range.tif");
+        folder.good("synth bumps --size 41x31 -o plain.tif");
+        folder.write(
+            "split.asc",
+            "ncols 5\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9999\n\
+             1 1 -9999 1 1\n1 1 -9999 2 1\n1 1 -9999 1 1\n",
+        );
+        folder
+            .write("wall.geojson", r#"{"type":"LineString","coordinates":[[9.01,44],[9.01,46]]}"#);
+        folder.write(
+            "huts.geojson",
+            r#"{"type":"MultiPoint","coordinates":[[9.002,45.155],[9.02,45.16]]}"#,
+        );
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, content: &str) {
+        fs::write(self.path(name), content).unwrap();
+    }
+
+    fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    fn json(&self, name: &str) -> Value {
+        serde_json::from_str(&self.read(name)).unwrap()
+    }
+
+    /// Runs a command line, split at blanks.
+    fn run(&self, line: &str) -> Outcome {
+        let output = Command::new(cargo_bin!("ridgeway"))
+            .args(line.split_whitespace())
+            .current_dir(self.0.path())
+            .output()
+            .unwrap();
+        Outcome {
+            code: output.status.code().unwrap(),
+            out: String::from_utf8(output.stdout).unwrap(),
+            err: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// Runs a command line that must do well.
+    fn good(&self, line: &str) -> String {
+        let outcome = self.run(line);
+        assert_eq!(outcome.code, 0, "{line}: {outcome:?}");
+        outcome.out
+    }
+
+    /// Runs a command line that must fail with this code and message, and write nothing.
+    fn bad(&self, line: &str, code: i32, message: &str) {
+        let before = self.files();
+        let outcome = self.run(line);
+        let lines = outcome.err.lines().filter(|line| !line.starts_with("note: "));
+        let said = lines.take_while(|line| !line.is_empty()).collect::<Vec<_>>().join("\n");
+        assert_eq!(said, format!("error: {message}"), "{line}");
+        assert_eq!(outcome.code, code, "{line}: {}", outcome.err);
+        assert_eq!(outcome.out, "", "{line}");
+        assert_eq!(self.files(), before, "{line}");
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let mut files: Vec<_> =
+            fs::read_dir(self.0.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        files
+    }
+}
+
+fn is_tiff(path: &Path) -> bool {
+    fs::read(path).unwrap().starts_with(b"II")
+}
+
+fn is_png(path: &Path) -> bool {
+    fs::read(path).unwrap().starts_with(b"\x89PNG")
+}
+
+#[test]
+fn info_tells_people_and_machines() {
+    let folder = Folder::new();
+    let text = folder.good("info range.tif");
+    assert!(text.contains("size       61 columns x 41 rows\n"), "{text}");
+    assert!(text.contains("CRS        EPSG:32632"), "{text}");
+    let json: Value = serde_json::from_str(&folder.good("info split.asc --json -q")).unwrap();
+    assert_eq!(json["columns"], 5);
+    assert_eq!(json["rows"], 3);
+    assert_eq!(json["void_count"], 3);
+    assert_eq!(json["min_height_m"], 1.0);
+    assert_eq!(json["max_height_m"], 2.0);
+    assert_eq!(json["cell_size"], serde_json::json!([10.0, 10.0]));
+    assert_eq!(json["extent"], serde_json::json!([0.0, 0.0, 50.0, 30.0]));
+    assert_eq!(json["unit"], "metre");
+    assert_eq!(json["crs"]["epsg"], Value::Null);
+}
+
+#[test]
+fn info_announces_the_surface_that_is_fitted() {
+    let folder = Folder::new();
+    folder.write("wide.asc", "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 20\ndy 45\n1 2 3 4 5 6\n");
+    let length = |command: &str| {
+        let text = folder.good(command);
+        let line = text.lines().find(|line| line.starts_with("surface")).unwrap();
+        line.rsplit_once(' ').unwrap().0.rsplit_once(' ').unwrap().1.to_owned()
+    };
+    assert_eq!(length("info wide.asc"), length("surface wide.asc"));
+}
+
+#[test]
+fn synth_lists_its_kinds_and_repeats_itself() {
+    let folder = Folder::new();
+    let list = folder.good("synth --list");
+    for kind in ["plane", "cylinder", "sphere", "cone", "bumps", "four-bumps", "range", "fractal"] {
+        assert!(list.lines().any(|line| line.starts_with(kind)), "{kind}");
+    }
+    folder.good("synth fractal --size 33x29 --seed 3 -o a.tif");
+    folder.good("synth fractal --size 33x29 --seed 3 -o b.tif --threads 1");
+    assert_eq!(fs::read(folder.path("a.tif")).unwrap(), fs::read(folder.path("b.tif")).unwrap());
+}
+
+#[test]
+fn surface_reports_residuals_and_writes_layers() {
+    let folder = Folder::new();
+    let line =
+        "surface range.tif --layers height,slope,gaussian,mean,k1,k2 -o s.tif --smooth 0 --json";
+    let json: Value = serde_json::from_str(&folder.good(line)).unwrap();
+    assert!(json["rms_residual_m"].as_f64().unwrap() < 1e-6, "{json}");
+    assert!(is_tiff(&folder.path("s.tif")));
+    let text = folder.good("surface range.tif --degree quintic --smooth 8cells");
+    assert!(text.contains("quintic B-spline, cut-off 240 m"), "{text}");
+}
+
+#[test]
+fn distance_writes_rasters_isolines_and_statistics() {
+    let folder = Folder::new();
+    let text = folder.good(
+        "distance range.tif --start pixel:5,5 --goal pixel:50,30 --metric isotropic \
+         -o d.tif --direction --isolines i.geojson --step 250 --stats",
+    );
+    assert!(text.contains(" 2501 of 2501 cells\n"), "{text}");
+    assert!(text.contains("median"), "{text}");
+    assert!(is_tiff(&folder.path("d.tif")));
+    let isolines = folder.json("i.geojson");
+    assert_eq!(isolines["features"][1]["properties"]["distance"], 500.0);
+    assert_eq!(isolines["features"][1]["properties"]["unit"], "m");
+    let info: Value = serde_json::from_str(&folder.good("info d.tif --json -q")).unwrap();
+    assert_eq!(info["min_height_m"], 0.0);
+}
+
+#[test]
+fn routes_end_where_they_were_asked_to() {
+    let folder = Folder::new();
+    let line = "route range.tif --start 500150,5000150 --start pixel:60,0 --goal huts.geojson \
+                -o r.geojson -o r.gpx -o r.csv --json";
+    let json: Value = serde_json::from_str(&folder.good(line)).unwrap();
+    assert_eq!(json["routes"].as_array().unwrap().len(), 2);
+    assert_eq!(json["routes"][0]["summary"]["cost_unit"], "AG units");
+    let geojson = folder.json("r.geojson");
+    let way = geojson["features"][0]["geometry"]["coordinates"].as_array().unwrap();
+    let end = way.last().unwrap();
+    assert!((end[0].as_f64().unwrap() - 9.002).abs() < 1e-6, "{end}");
+    assert!((end[1].as_f64().unwrap() - 45.155).abs() < 1e-6, "{end}");
+    assert_eq!(geojson["provenance"]["dem"], "range.tif");
+    assert_eq!(geojson["provenance"]["start"][1], "pixel:60,0");
+    assert!(
+        geojson["provenance"]["command"].as_str().unwrap().starts_with("ridgeway route range.tif")
+    );
+    assert!(geojson["provenance"]["metrics"][0]["delta_per_m"].as_f64().unwrap() > 0.0);
+    assert!(folder.read("r.gpx").contains("<trk>"));
+    assert!(folder.read("r.csv").starts_with("route,distance_m,x,y,height_m"));
+}
+
+#[test]
+fn notations_of_one_place_give_one_route() {
+    let folder = Folder::new();
+    let route = |start: &str| {
+        let line = format!("route range.tif --start {start} --goal pixel:50,30 --json");
+        let json: Value = serde_json::from_str(&folder.good(&line)).unwrap();
+        json["routes"][0]["summary"]["cost"].as_f64().unwrap()
+    };
+    let cost = route("500300,5000900");
+    assert_eq!(route("pixel:10,10"), cost);
+    // UTM 32N of longitude 9°, the zone's middle, is x = 500000.
+    let near = route("lonlat:9.003815,45.161577");
+    assert!((near - cost).abs() < 1e-3 * cost, "{near} {cost}");
+}
+
+#[test]
+fn a_tensor_raster_measures_as_its_tensor_says() {
+    let folder = Folder::new();
+    folder.good("synth plane --size 41x31 --relief 100 -o plane.tif");
+    // Bands c, 0, c: the unit tensor times the slope in degrees.
+    folder.good("surface plane.tif --layers slope,gaussian,slope -o tensor.tif");
+    let distance = |more: &str| {
+        let line =
+            format!("distance plane.tif --start pixel:5,5 --goal pixel:35,5 --json -q {more}");
+        let json: Value = serde_json::from_str(&folder.good(&line)).unwrap();
+        json["goals"][0]["distance"].as_f64().unwrap()
+    };
+    // The plane climbs h/2a = 100/1200 over its longer half-axes.
+    let slope = (100.0f64 / 1200.0).atan().to_degrees();
+    let expected = 900.0 / slope.sqrt();
+    let found = distance("--tensor tensor.tif");
+    assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
+}
+
+#[test]
+fn compare_fills_a_folder_and_repeats_itself() {
+    let folder = Folder::new();
+    let line = "compare range.tif --start pixel:5,5 --goal pixel:50,30 -o cmp";
+    let table = folder.good(line);
+    let head = table.lines().next().unwrap();
+    for column in [
+        "route",
+        "length",
+        "climb",
+        "max grade",
+        "mean grade",
+        "∫|κn|ds",
+        "x isotropic",
+        "x curvature",
+    ] {
+        assert!(head.contains(column), "{head}");
+    }
+    let summary = folder.json("cmp/summary.json");
+    for (r, metric) in ["isotropic", "curvature"].into_iter().enumerate() {
+        assert_eq!(summary["routes"][r]["name"], metric);
+        assert_eq!(summary["routes"][r]["costs"][metric]["ratio_to_best"], 1.0);
+    }
+    assert!(is_png(&folder.path("cmp/map.png")));
+    assert_eq!(folder.json("cmp/routes.geojson")["features"].as_array().unwrap().len(), 2);
+    assert!(folder.read("cmp/profile.csv").contains("\nisotropic,"));
+    folder.write("cmp/mine.txt", "keep");
+    folder.bad(line, 2, "cmp/routes.geojson exists; give --overwrite to replace it");
+    let again = folder.good(&format!("{line} --overwrite --threads 1"));
+    assert_eq!(table, again);
+    assert_eq!(folder.read("cmp/mine.txt"), "keep");
+}
+
+#[test]
+fn render_draws_every_layer_and_routes() {
+    let folder = Folder::new();
+    for layer in ["hillshade", "height", "slope", "mean", "gaussian"] {
+        folder.good(&format!("render range.tif --layer {layer} --width 200 -o {layer}.png"));
+        assert!(is_png(&folder.path(&format!("{layer}.png"))));
+    }
+    folder.good("render range.tif --start pixel:5,5 --goal pixel:50,30 --width 200 -o route.png");
+    assert!(is_png(&folder.path("route.png")));
+}
+
+#[test]
+fn quiet_is_silent_and_scripts_are_printed() {
+    let folder = Folder::new();
+    let outcome = folder.run("route plain.tif --start pixel:5,5 --goal pixel:30,20 -q");
+    assert_eq!((outcome.code, outcome.out.as_str(), outcome.err.as_str()), (0, "", ""));
+    assert!(folder.good("completions bash").contains("ridgeway"));
+    assert!(folder.good("man").contains(".TH ridgeway"));
+    assert!(folder.good("--version").starts_with("ridgeway "));
+}
+
+#[test]
+fn progress_is_told_when_asked_for() {
+    let folder = Folder::new();
+    let outcome = folder.run("route range.tif --start pixel:5,5 --goal pixel:30,20 --progress");
+    assert!(outcome.err.contains("solving distance"), "{outcome:?}");
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_error() {
+    let folder = Folder::new();
+    let mut child = Command::new(cargo_bin!("ridgeway"))
+        .args(["completions", "bash"])
+        .current_dir(folder.0.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr), (Some(0), Vec::new()));
+}
+
+#[test]
+fn bad_input_is_named() {
+    let folder = Folder::new();
+    folder.bad("info missing.tif", 3, "missing.tif: No such file or directory (os error 2)");
+    folder.write("notes.txt", "hello\n");
+    folder.bad(
+        "info notes.txt",
+        2,
+        "notes.txt: not a DEM of a format that is read (GeoTIFF, ESRI ASCII grid, SRTM .hgt): \
+         it begins with bytes [68, 65, 6c, 6c, 6f, 0a]",
+    );
+    folder.write("empty.geojson", r#"{"type":"FeatureCollection","features":[]}"#);
+    folder.bad(
+        "route range.tif --start empty.geojson --goal pixel:3,4",
+        2,
+        "empty.geojson: holds no points, lines or areas",
+    );
+    folder.bad(
+        "route range.tif --start pixel:3,3 --goal pixel:3,4 --tensor range.tif",
+        2,
+        "range.tif: has 1 band; a tensor raster has three: D11, D12, D22",
+    );
+    folder.bad(
+        "route plain.tif --start huts.geojson --goal pixel:3,4",
+        2,
+        "huts.geojson: the terrain's CRS is none, from which there is no way to longitude and latitude; \
+         give places in map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+    );
+}
+
+#[test]
+fn bad_outputs_are_refused_before_the_work() {
+    let folder = Folder::new();
+    let route = "route range.tif --start pixel:3,3 --goal pixel:50,30";
+    folder.write("r.gpx", "precious");
+    folder.bad(&format!("{route} -o r.gpx"), 2, "r.gpx exists; give --overwrite to replace it");
+    assert_eq!(folder.read("r.gpx"), "precious");
+    folder.bad(
+        &format!("{route} -o r.kml"),
+        2,
+        "r.kml: cannot tell the format from the name; end it in .geojson, .json, .gpx, .csv",
+    );
+    folder.bad(
+        &format!("{route} -o no/r.csv"),
+        2,
+        "cannot write no/r.csv: the folder no does not exist; create it first",
+    );
+    folder.bad(&format!("{route} -o a.csv -o a.csv"), 2, "a.csv: named twice as an output");
+    folder.bad(
+        "surface range.tif -o range.tif --overwrite",
+        2,
+        "range.tif: is the DEM itself; choose another name for the output",
+    );
+    folder.bad(
+        "compare range.tif --start pixel:3,3 --goal pixel:50,30 -o r.gpx",
+        2,
+        "r.gpx: is a file; name a folder",
+    );
+}
+
+#[test]
+fn places_off_the_ground_are_explained() {
+    let folder = Folder::new();
+    let from = |start: &str, message: &str| {
+        folder.bad(&format!("route range.tif --start {start} --goal pixel:50,30"), 2, message);
+    };
+    from(
+        "1,2",
+        "--start 1,2 lies outside the DEM, which reaches from 500000,5000000 to 501800,5001200; \
+         the nearest place on it is 500000,5000000",
+    );
+    from(
+        "-5000300,500300",
+        "--start -5000300,500300 lies outside the DEM, which reaches from 500000,5000000 to \
+         501800,5001200; the nearest place on it is 500000,5000000",
+    );
+    from(
+        "5000300,500300",
+        "--start 5000300,500300 lies outside the DEM, which reaches from 500000,5000000 to \
+         501800,5001200; x and y look swapped: try 500300,5000300",
+    );
+    from(
+        "lonlat:45.155,9.002",
+        "--start lonlat:45.155,9.002 lies outside the DEM, which reaches from lonlat:9,45.153477 to \
+         lonlat:9.022904,45.164277; longitude and latitude look swapped: try lonlat:9.002,45.155",
+    );
+    from(
+        "pixel:61,3",
+        "--start pixel:61,3 lies outside the DEM, which reaches from pixel:0,0 to pixel:60,40; \
+         the nearest place on it is pixel:60,3",
+    );
+    folder.bad(
+        "route split.asc --start pixel:2,1 --goal pixel:4,1",
+        2,
+        "--start pixel:2,1 lies on a void of the DEM; the nearest good place is pixel:1,1",
+    );
+    folder.bad(
+        "route range.tif --start pixel:3,3 --goal 500780,5000600 --barrier wall.geojson",
+        2,
+        "--goal 500780,5000600 lies on a barrier; the nearest good place is 500750,5000600",
+    );
+    folder.bad(
+        "route plain.tif --start lonlat:1,2 --goal pixel:4,1",
+        2,
+        "the terrain's CRS is none, from which there is no way to longitude and latitude; give places in \
+         map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+    );
+    folder.bad(
+        "route range.tif --start pixel:3,3 --goal wall.geojson",
+        2,
+        "--goal takes points; its file also holds lines or areas",
+    );
+}
+
+#[test]
+fn no_way_is_an_answer_of_its_own() {
+    let folder = Folder::new();
+    folder.bad(
+        "route split.asc --start pixel:0,1 --goal pixel:4,1",
+        1,
+        "--goal pixel:4,1 cannot be reached from the start: voids or barriers lie between; \
+         the nearest good place is pixel:1,1",
+    );
+    for command in ["route", "compare"] {
+        folder.bad(
+            &format!(
+                "{command} range.tif --start pixel:3,3 --goal pixel:50,4 --barrier wall.geojson"
+            ),
+            1,
+            "--goal pixel:50,4 cannot be reached from the start: voids or barriers lie between; \
+             the nearest good place is pixel:25,4",
+        );
+    }
+}
+
+#[test]
+fn bad_flags_are_explained() {
+    let folder = Folder::new();
+    let route = "route range.tif --start pixel:3,3 --goal pixel:50,30";
+    for (flags, message) in [
+        (
+            "--metric euclid",
+            "invalid value 'euclid' for '--metric <METRIC>'\n  \
+             [possible values: isotropic, curvature, tensor]",
+        ),
+        (
+            "--delta -0.1",
+            "invalid value '-0.1' for '--delta <1/M>': expected auto, auto:SHARE, or a curvature above 0 \
+             in 1/m such as 0.001",
+        ),
+        (
+            "--smooth -3",
+            "invalid value '-3' for '--smooth <METRES>': expected a length in metres, a number of cells \
+             such as 16cells, auto, or 0",
+        ),
+        (
+            "--max-slope 95",
+            "invalid value '95' for '--max-slope <DEG>': expected an angle above 0 and up to 90 degrees",
+        ),
+        (
+            "--start valley",
+            "invalid value 'valley' for '--start <PLACE>': expected X,Y, lonlat:LON,LAT, pixel:COL,ROW or \
+             a .geojson file",
+        ),
+        ("--threads 0", "invalid value '0' for '--threads <N>': 0 is not in 1..=1024"),
+        ("--metric tensor", "the metric `tensor` needs --tensor FILE.tif"),
+    ] {
+        folder.bad(&format!("{route} {flags}"), 2, message);
+    }
+    folder.bad(
+        "synth bumps --size 30 -o x.tif",
+        2,
+        "invalid value '30' for '--size <COLSxROWS>': expected columns and rows, for example 301x201, \
+         and at most 268435456 cells",
+    );
+    folder.bad(
+        "synth hills -o x.tif",
+        2,
+        "no synthetic terrain is called \"hills\"; there are plane, cylinder, sphere, cone, bumps, \
+         four-bumps, range, fractal, craters, switchbacks",
+    );
+    folder.bad(
+        "render range.tif --start pixel:3,3 --goal pixel:9,9 --layer slope -o x.png",
+        2,
+        "routes are drawn on the hillshade only; leave --layer out",
+    );
+    folder.bad(
+        "compare range.tif --start pixel:3,3 --goal huts.geojson -o cmp",
+        2,
+        "--goal huts.geojson holds 2 points; compare takes one goal",
+    );
+}
