@@ -1,6 +1,7 @@
 //! A file becomes heights in metres on a frame.
 
 mod crs;
+pub mod synthetic;
 
 use std::path::Path;
 
