@@ -1,0 +1,199 @@
+//! What must hold on any terrain, through the whole way from heights to routes.
+
+use glam::DVec2;
+use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::{
+    Control, Crs, DistanceMap, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers,
+    Route, Solver, Terrain, route::trace,
+};
+
+/// A rough terrain of `n × n` nodes.
+fn heights(n: usize) -> Vec<f64> {
+    Synthetic::new(SyntheticKind::Range, n, n, 30.0).unwrap().with_seed(11).heights()
+}
+
+fn terrain(cols: usize, rows: usize, step: DVec2, heights: Vec<f64>) -> Terrain {
+    let frame = GridFrame::new(cols, rows, DVec2::new(5e5, 5e6), step, Ground::METRES).unwrap();
+    Terrain::new(frame, heights, Crs::none()).unwrap()
+}
+
+fn square(n: usize, heights: Vec<f64>) -> Terrain {
+    terrain(n, n, DVec2::splat(30.0), heights)
+}
+
+struct Planned {
+    distance: DistanceMap,
+    route: Route,
+}
+
+fn plan(terrain: &Terrain, metric: &Metric, start: DVec2, goal: DVec2) -> Planned {
+    let control = Control::default();
+    let surface = HeightSurface::fit(terrain, &FitOptions::default(), &control).unwrap();
+    let field = metric.on(&surface, &Modifiers::default()).unwrap();
+    let distance = Solver::default().solve(&field, &start.into(), &[], &control).unwrap();
+    let route = trace(&distance, &field, goal).unwrap();
+    Planned { distance, route }
+}
+
+fn metrics() -> [Metric; 2] {
+    [Metric::Isotropic, Metric::Curvature(Default::default())]
+}
+
+const N: usize = 81;
+const START: DVec2 = DVec2::new(12.0, 70.0);
+const GOAL: DVec2 = DVec2::new(66.3, 9.8);
+
+/// Farthest that a point of `a` lies from the line `b`, in cells.
+fn deviation(a: &[DVec2], b: &[DVec2]) -> f64 {
+    let to_line = |p: &DVec2| {
+        let near = b.windows(2).map(|ends| {
+            let w = ends[1] - ends[0];
+            let t = ((*p - ends[0]).dot(w) / w.length_squared().max(1e-30)).clamp(0.0, 1.0);
+            p.distance(ends[0].lerp(ends[1], t))
+        });
+        near.fold(f64::INFINITY, f64::min)
+    };
+    a.iter().map(to_line).fold(0.0, f64::max)
+}
+
+#[test]
+fn scaling_a_terrain_changes_no_route_and_scales_the_isotropic_cost() {
+    let unit = square(N, heights(N));
+    for scale in [0.25, 16.0, 3.0] {
+        let tall = heights(N).into_iter().map(|z| z * scale).collect();
+        let scaled = terrain(N, N, DVec2::splat(30.0 * scale), tall);
+        for metric in metrics() {
+            let (a, b) = (plan(&unit, &metric, START, GOAL), plan(&scaled, &metric, START, GOAL));
+            assert!(deviation(&a.route.grid, &b.route.grid) < 0.02, "{metric:?} × {scale}");
+            let ratio = b.route.summary.length_m / a.route.summary.length_m / scale;
+            assert!((ratio - 1.0).abs() < 1e-3, "{metric:?}: {ratio}");
+        }
+    }
+}
+
+#[test]
+fn moving_a_terrain_changes_nothing() {
+    let here = square(N, heights(N));
+    let lifted = square(N, heights(N).into_iter().map(|z| z + 1000.0).collect());
+    for metric in metrics() {
+        let (a, b) = (plan(&here, &metric, START, GOAL), plan(&lifted, &metric, START, GOAL));
+        assert!(deviation(&a.route.grid, &b.route.grid) < 0.02);
+        assert!((a.route.summary.cost / b.route.summary.cost - 1.0).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn mirrored_and_transposed_terrains_have_mirrored_and_transposed_routes() {
+    let z = heights(N);
+    let last = (N - 1) as f64;
+    let remap = |from: fn(usize, usize) -> (usize, usize)| {
+        let node = |i: usize| from(i % N, i / N);
+        square(N, (0..N * N).map(|i| z[node(i).1 * N + node(i).0]).collect())
+    };
+    let mirrored = remap(|c, r| (N - 1 - c, r));
+    let transposed = remap(|c, r| (r, c));
+    let mirror = |p: DVec2| DVec2::new(last - p.x, p.y);
+    let transpose = |p: DVec2| DVec2::new(p.y, p.x);
+    for metric in metrics() {
+        let plain = plan(&square(N, z.clone()), &metric, START, GOAL).route;
+        let other = plan(&mirrored, &metric, mirror(START), mirror(GOAL)).route;
+        let back: Vec<DVec2> = other.grid.iter().map(|&p| mirror(p)).collect();
+        assert!(deviation(&back, &plain.grid) < 0.05, "{metric:?} mirrored");
+        let other = plan(&transposed, &metric, transpose(START), transpose(GOAL)).route;
+        let back: Vec<DVec2> = other.grid.iter().map(|&p| transpose(p)).collect();
+        assert!(deviation(&back, &plain.grid) < 0.05, "{metric:?} transposed");
+    }
+}
+
+#[test]
+fn there_and_back_cost_the_same() {
+    for metric in metrics() {
+        let terrain = square(N, heights(N));
+        let (there, back) =
+            (plan(&terrain, &metric, START, GOAL), plan(&terrain, &metric, GOAL, START));
+        let (a, b) = (there.route.summary.cost, back.route.summary.cost);
+        assert!((a / b - 1.0).abs() < 1e-2, "{metric:?}: {a} there, {b} back");
+    }
+}
+
+#[test]
+fn distances_obey_the_triangle_inequality() {
+    let terrain = square(N, heights(N));
+    let places = [START, GOAL, DVec2::new(40.0, 40.0), DVec2::new(70.5, 71.5)];
+    for metric in metrics() {
+        let maps = places.map(|at| plan(&terrain, &metric, at, GOAL).distance);
+        for a in 0..places.len() {
+            for b in 0..places.len() {
+                for c in 0..places.len() {
+                    let g = |from: usize, to: usize| maps[from].at(places[to]).unwrap();
+                    assert!(g(a, c) <= 1.02 * (g(a, b) + g(b, c)), "{a} {b} {c}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn stretched_cells_give_the_same_distances_at_the_same_places() {
+    // The same hills on square cells and on cells twice as high as wide.
+    let hills = Synthetic::new(SyntheticKind::Bumps, 161, 161, 5.0).unwrap();
+    let sample = |cols: usize, rows: usize, step: DVec2| {
+        let at = |i: usize| {
+            hills.height((i % cols) as f64 * step.x - 400.0, 400.0 - (i / cols) as f64 * step.y)
+        };
+        terrain(cols, rows, step, (0..cols * rows).map(at).collect())
+    };
+    let (fine, flat) =
+        (sample(161, 161, DVec2::splat(5.0)), sample(161, 81, DVec2::new(5.0, 10.0)));
+    let options =
+        FitOptions { smoothing: ridgeway::Smoothing::Interpolate, ..FitOptions::default() };
+    let control = Control::default();
+    for metric in metrics() {
+        let [a, b] = [(&fine, 1.0), (&flat, 2.0)].map(|(terrain, stretch)| {
+            let surface = HeightSurface::fit(terrain, &options, &control).unwrap();
+            let field = metric.on(&surface, &Modifiers::default()).unwrap();
+            let start = DVec2::new(30.0, 40.0 / stretch);
+            let map = Solver::default().solve(&field, &start.into(), &[], &control).unwrap();
+            move |col: usize, row: usize| map.at_node(col, row / stretch as usize)
+        });
+        for row in (0..161).step_by(20) {
+            for col in (0..161).step_by(20) {
+                let (a, b) = (a(col, row), b(col, row));
+                assert!(
+                    (a - b).abs() < 0.03 * a.max(b) + 1e-9,
+                    "{metric:?} ({col}, {row}): {a} {b}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_terrain_in_degrees_is_solved_in_metres() {
+    // A flat plane of 0.2° around 60° N: ground distances are those of the ellipsoid.
+    let n = 201;
+    let step = DVec2::splat(0.001);
+    let frame = GridFrame::new(n, n, DVec2::new(10.0, 60.1), step, Ground::WGS84).unwrap();
+    let terrain = Terrain::new(frame, vec![0.0; n * n], Crs::from_epsg(4326).unwrap()).unwrap();
+    let centre = DVec2::splat(100.0);
+    let planned = plan(&terrain, &Metric::Isotropic, centre, DVec2::new(190.0, 100.0));
+    // 0.09° of longitude at 60° N: 0.09 · 55 800.2 m; of latitude: 0.09 · 111 412.2 m (tables of the NGA).
+    assert!((planned.route.summary.length_m / 5022.0 - 1.0).abs() < 1e-3);
+    let north = planned.distance.at(DVec2::new(100.0, 10.0)).unwrap();
+    assert!((north / 10_027.1 - 1.0).abs() < 2e-3, "{north}");
+}
+
+#[test]
+fn routes_begin_and_end_where_they_were_asked_to_and_know_their_length() {
+    let terrain = square(N, heights(N));
+    for metric in metrics() {
+        let route = plan(&terrain, &metric, START, GOAL).route;
+        assert_eq!(route.grid.first(), Some(&START));
+        assert_eq!(route.grid.last(), Some(&GOAL));
+        let sum: f64 = route.points.windows(2).map(|p| p[0].distance(p[1])).sum();
+        assert!((sum / route.summary.length_m - 1.0).abs() < 1e-3);
+        assert!(route.summary.plan_length_m < route.summary.length_m);
+        let rise = route.points[route.points.len() - 1].z - route.points[0].z;
+        assert!((route.summary.climb_m - route.summary.descent_m - rise).abs() < 1e-6);
+    }
+}
