@@ -127,7 +127,10 @@ fn info_tells_people_and_machines() {
 #[test]
 fn info_announces_the_surface_that_is_fitted() {
     let folder = Folder::new();
-    folder.write("wide.asc", "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 20\ndy 45\n1 2 3 4 5 6\n");
+    folder.write(
+        "wide.asc",
+        "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ndx 20\ndy 45\n1 2 3 4 5 6\n",
+    );
     let length = |command: &str| {
         let text = folder.good(command);
         let line = text.lines().find(|line| line.starts_with("surface")).unwrap();
