@@ -7,15 +7,17 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 use ridgeway::route::trace;
 use ridgeway::{
-    Control, Crs, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric,
-    MetricField, Modifiers, Smoothing, Solver, Sym2, Terrain,
+    Control, Crs, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground, HeightSurface,
+    Metric, MetricField, Modifiers, Smoothing, Solver, Sym2, Terrain,
 };
 
 const RESOLUTIONS: [usize; 4] = [101, 201, 401, 801];
 
 fn main() -> Result<(), Error> {
     directions()?;
-    println!("\nMean error of the distance, relative to the mean distance; the order from each pair");
+    println!(
+        "\nMean error of the distance, relative to the mean distance; the order from each pair"
+    );
     println!("| case | {} | last order |", RESOLUTIONS.map(|n| format!("{n}²")).join(" | "));
     println!("|---|---|---|---|---|---|");
     constants()?;
@@ -179,13 +181,16 @@ fn routes() -> Result<(), Error> {
         let trough = cylinder_surface(n)?;
         let [_, (_, metric, slowness)] = metrics();
         let metric = metric.on(&trough, &Modifiers::default())?;
-        let [most, median] = deviation(&metric, DVec2::ZERO, &goals, |at| slowness * unrolled(at) / slowness.max_element())?;
+        let [most, median] = deviation(&metric, DVec2::ZERO, &goals, |at| {
+            slowness * unrolled(at) / slowness.max_element()
+        })?;
         cells.push(format!("{most:.2} ({median:.2})"));
     }
     println!("| cylinder, curvature | {} |", cells.join(" | "));
     cells.clear();
     // D = (ΦᵀΦ)⁻¹, Φ = Dφ: routes are preimages of straight lines.
-    let phi = |at: DVec2| DVec2::new(at.x + 0.1 * (TAU * at.y).sin(), at.y + 0.1 * (TAU * at.x).sin());
+    let phi =
+        |at: DVec2| DVec2::new(at.x + 0.1 * (TAU * at.y).sin(), at.y + 0.1 * (TAU * at.x).sin());
     for n in RESOLUTIONS {
         let plane = surface(n, |_| 0.0)?;
         let frame = plane.frame();

@@ -77,7 +77,7 @@ pub mod terrain;
 pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{DistanceMap, Solver, StartRegion};
 pub use error::{Error, Result};
-pub use grid::{Ground, GridFrame};
+pub use grid::{GridFrame, Ground};
 pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
 pub use route::{Comparison, Route};
 pub use surface::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};

@@ -18,7 +18,7 @@ const REFUSED: [(&str, &str); 3] = [
 ];
 
 /// Longest that any of the small files may take, damaged or not.
-const PATIENCE: Duration = Duration::from_secs(2);
+const PATIENCE: Duration = Duration::from_secs(5);
 
 fn corpus() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/corpus")

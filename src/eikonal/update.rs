@@ -20,7 +20,7 @@
 use glam::DVec2;
 use multiversion::multiversion;
 
-use super::field::{AREA, SIDE, TensorTile};
+use super::field::{SIDE, TensorTile};
 use crate::Sym2;
 
 /// Value of a node that no front has reached. Far above any distance, and its square still a finite `f32`.
@@ -95,6 +95,48 @@ impl Coefficients {
     };
 }
 
+impl Coefficients {
+    /// Sets one lane from the tensor of an open node. `D` is stored as (xx, xy, det): the determinant of a very
+    /// anisotropic tensor would be lost in the rounding of xx·yy − xy².
+    #[inline(always)]
+    fn set(&mut self, i: usize, xx: f32, xy: f32, det: f32, tolerance: f32) {
+        let open = det > 0.0;
+        let choose = |value: f32, closed: f32| if open { value } else { closed };
+        let yy = (det + xy * xy) / xx;
+        let idet = 1.0 / det;
+        let diagonal = |sum: f32| (if sum > 0.0 { sum } else { 0.0 } * idet).sqrt();
+        let (east, south) = ((yy * idet).sqrt(), (xx * idet).sqrt());
+        let (rising, falling) = (diagonal(xx + yy - 2.0 * xy), diagonal(xx + yy + 2.0 * xy));
+        self.xx[i] = choose(xx, -1.0);
+        self.xy[i] = choose(xy, 0.0);
+        self.yy[i] = choose(yy, -1.0);
+        self.det[i] = choose(det, 0.0);
+        self.ixx[i] = choose(1.0 / xx, 0.0);
+        self.iyy[i] = choose(1.0 / yy, 0.0);
+        self.east[i] = choose(east, UNREACHED);
+        self.south[i] = choose(south, UNREACHED);
+        self.rising[i] = choose(rising, UNREACHED);
+        self.falling[i] = choose(falling, UNREACHED);
+        let shortest = least(least(east, south), least(rising, falling));
+        self.tolerance[i] = choose(tolerance * shortest, UNREACHED);
+    }
+
+    #[inline(always)]
+    fn copy_lane(&mut self, lane: usize, from: &Self, i: usize) {
+        self.xx[lane] = from.xx[i];
+        self.xy[lane] = from.xy[i];
+        self.yy[lane] = from.yy[i];
+        self.det[lane] = from.det[i];
+        self.ixx[lane] = from.ixx[i];
+        self.iyy[lane] = from.iyy[i];
+        self.east[lane] = from.east[i];
+        self.south[lane] = from.south[i];
+        self.rising[lane] = from.rising[i];
+        self.falling[lane] = from.falling[i];
+        self.tolerance[lane] = from.tolerance[i];
+    }
+}
+
 /// A tile on the workbench: its values and coefficients, sheared so that the nodes of one anti-diagonal,
 /// which do not depend on each other in a sweep along the diagonal, lie side by side.
 ///
@@ -131,34 +173,7 @@ impl Bench {
     ) {
         self.mirrored = mirrored;
         self.load_values(block);
-        let turn = if mirrored { -1.0 } else { 1.0 };
-        for row in 0..SIDE {
-            let lane = if mirrored { SIDE - 1 - row } else { row };
-            let of = |values: &[f32; AREA]| -> [f32; SIDE] {
-                std::array::from_fn(|col| values[row * SIDE + col])
-            };
-            let line = row_coefficients(
-                of(&tensors.xx),
-                of(&tensors.xy),
-                of(&tensors.det),
-                turn,
-                tolerance,
-            );
-            for col in 0..SIDE {
-                let to = &mut self.coefficients[col + lane];
-                to.xx[lane] = line.xx[col];
-                to.xy[lane] = line.xy[col];
-                to.yy[lane] = line.yy[col];
-                to.det[lane] = line.det[col];
-                to.ixx[lane] = line.ixx[col];
-                to.iyy[lane] = line.iyy[col];
-                to.east[lane] = line.east[col];
-                to.south[lane] = line.south[col];
-                to.rising[lane] = line.rising[col];
-                to.falling[lane] = line.falling[col];
-                to.tolerance[lane] = line.tolerance[col];
-            }
-        }
+        load_coefficients(tensors, &mut self.coefficients, mirrored, tolerance);
     }
 
     fn load_values(&mut self, block: &Block) {
@@ -187,48 +202,55 @@ impl Bench {
     }
 }
 
-/// Coefficients of a row of nodes; `turn = −1` mirrors the row axis.
-#[inline]
-fn row_coefficients(
-    xx: [f32; SIDE],
-    xy: [f32; SIDE],
-    det: [f32; SIDE],
-    turn: f32,
+/// The coefficients of a tile, sheared like its values.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn load_coefficients(
+    tensors: &TensorTile,
+    coefficients: &mut [Coefficients; STEPS],
+    mirrored: bool,
     tolerance: f32,
-) -> Coefficients {
-    let mut k = Coefficients::CLOSED;
-    for i in 0..SIDE {
-        let open = det[i] > 0.0;
-        let xy = turn * xy[i];
-        // D is stored as (xx, xy, det): the determinant of a very anisotropic tensor would be lost in
-        // the rounding of xx·yy − xy².
-        let yy = (det[i] + xy * xy) / xx[i];
-        let idet = 1.0 / det[i];
-        let steps = [
-            (yy * idet).sqrt(),
-            (xx[i] * idet).sqrt(),
-            ((xx[i] + yy - 2.0 * xy).max(0.0) * idet).sqrt(),
-            ((xx[i] + yy + 2.0 * xy).max(0.0) * idet).sqrt(),
-        ];
-        if open {
-            k.xx[i] = xx[i];
-            k.xy[i] = xy;
-            k.yy[i] = yy;
-            k.det[i] = det[i];
-            k.ixx[i] = 1.0 / xx[i];
-            k.iyy[i] = 1.0 / yy;
-            [k.east[i], k.south[i], k.rising[i], k.falling[i]] = steps;
-            k.tolerance[i] =
-                tolerance * least(least(steps[0], steps[1]), least(steps[2], steps[3]));
+) {
+    let turn = if mirrored { -1.0 } else { 1.0 };
+    for row in 0..SIDE {
+        let lane = if mirrored { SIDE - 1 - row } else { row };
+        let xx = lanes(&tensors.xx, row * SIDE);
+        let xy = lanes(&tensors.xy, row * SIDE);
+        let det = lanes(&tensors.det, row * SIDE);
+        let mut line = Coefficients::CLOSED;
+        for i in 0..SIDE {
+            line.set(i, xx[i], turn * xy[i], det[i], tolerance);
+        }
+        for col in 0..SIDE {
+            coefficients[col + lane].copy_lane(lane, &line, col);
         }
     }
-    k
 }
 
 /// The smaller of two; compiles to one instruction because NaN is not its business.
 #[inline(always)]
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
+}
+
+/// As many values as a tile has rows, from `shift` on.
+#[inline(always)]
+fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
+    // Not `array::from_fn` or an iterator: what is not inlined here is not compiled for the wide registers.
+    let mut lanes = [0.0; SIDE];
+    lanes.copy_from_slice(&line[shift..shift + SIDE]);
+    lanes
+}
+
+/// A diagonal neighbour, hidden where both nodes beside the step to it are unreached: between two walls the step
+/// would leak through. Where they are only not reached yet the step is taken one update later, so the
+/// solution is the same.
+#[inline(always)]
+fn pass(diagonal: f32, a: f32, b: f32) -> f32 {
+    if least(a, b) < UNREACHED { diagonal } else { UNREACHED }
 }
 
 /// One triangle: the value through the segment from axis neighbour `a` to diagonal neighbour `b`.
@@ -262,23 +284,14 @@ fn sweep(
     for step in 0..STEPS {
         let step = if descending { STEPS - 1 - step } else { step };
         let k = &coefficients[step];
-        // Lanes of anti-diagonal `step + 2 + along`, rows shifted by `across`.
-        let lanes = |along: usize, across: usize| -> [f32; SIDE] {
-            let line = &values[step + along];
-            std::array::from_fn(|i| line[i + across])
-        };
-        let (old, east, west) = (lanes(2, 1), lanes(3, 1), lanes(1, 1));
-        let (south, north) = (lanes(3, 2), lanes(1, 0));
-        let (south_east, north_west) = (lanes(4, 2), lanes(0, 0));
-        let (north_east, south_west) = (lanes(2, 0), lanes(2, 2));
+        let line = |along: usize| &values[step + along];
+        let (old, east, west) = (lanes(line(2), 1), lanes(line(3), 1), lanes(line(1), 1));
+        let (south, north) = (lanes(line(3), 2), lanes(line(1), 0));
+        let (south_east, north_west) = (lanes(line(4), 2), lanes(line(0), 0));
+        let (north_east, south_west) = (lanes(line(2), 0), lanes(line(2), 2));
         let mut new = [0f32; SIDE];
         for i in 0..SIDE {
             let (e, w, s, n) = (east[i], west[i], south[i], north[i]);
-            // A diagonal step between two nodes that are both walls would leak through. Between two that
-            // are only not reached yet it is allowed one update later, so the solution is the same.
-            let pass = |diagonal: f32, a: f32, b: f32| {
-                if least(a, b) < UNREACHED { diagonal } else { UNREACHED }
-            };
             let (se, nw) = (pass(south_east[i], s, e), pass(north_west[i], n, w));
             let (ne, sw) = (pass(north_east[i], n, e), pass(south_west[i], s, w));
             let edges = least(

@@ -36,14 +36,16 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
     };
     // Tie points give the centre of a cell, not its corner.
     let point = keys.short(key::RASTER_TYPE) == Some(2);
-    let (origin, step) =
-        placement(image, point)?.or_else(|| world_file(path)).unwrap_or_else(|| {
-            notes.push(
-                "the file is not georeferenced: cells of 1 map unit at the origin are assumed"
-                    .to_owned(),
-            );
-            (DVec2::new(0.5, layout.rows as f64 - 0.5), DVec2::new(1.0, -1.0))
-        });
+    let place = match placement(image, point)? {
+        Some(place) => Some(place),
+        None => world_file(path)?,
+    };
+    let (origin, step) = place.unwrap_or_else(|| {
+        notes.push(
+            "the file has no place on a map: cells of 1 × 1 at the origin are assumed".to_owned(),
+        );
+        (DVec2::new(0.5, layout.rows as f64 - 0.5), DVec2::new(1.0, -1.0))
+    });
     let crs = Crs::from_geo_keys(keys).map_err(|e| Fault::Unsupported(e.to_string()))?;
     if want == Want::Heights {
         if layout.bands > 1 {
@@ -54,7 +56,8 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
         }
         if unit.is_none() && crs.unit().contains("foot") {
             notes.push(format!(
-                "the map unit is the {}, but the file does not say the unit of the heights; they are taken as metres",
+                "the map unit is the {}, but the file does not say the unit of the heights; \
+                 they are taken as metres",
                 crs.unit()
             ));
         }
@@ -144,9 +147,13 @@ fn geo_keys(image: &Directory) -> Outcome<GeoKeys> {
 }
 
 /// Map coordinates of the centre of the first cell, and the step per column and stored row.
-fn placement(image: &Directory, point: bool) -> Outcome<Option<(DVec2, DVec2)>> {
-    const ROTATED: &str = "the grid is rotated or sheared against the map; \
-                           make it north-up with `gdalwarp -r bilinear IN OUT.tif`";
+type Placement = (DVec2, DVec2);
+
+const ROTATED: &str = "the grid is rotated or sheared against the map; make it north-up with \
+                       `gdalwarp -r bilinear IN OUT.tif`";
+
+/// What the tags of the image say of its place; `None` if nothing.
+fn placement(image: &Directory, point: bool) -> Outcome<Option<Placement>> {
     let half = if point { 0.0 } else { 0.5 };
     let matrix = image.doubles(tag::MODEL_TRANSFORMATION)?;
     if let [a, b, _, x, d, e, _, y, ..] = matrix[..] {
@@ -179,16 +186,20 @@ fn check_step(step: DVec2) -> Outcome<DVec2> {
     }
 }
 
-/// The six lines of a world file beside: x per column, y per column, x per row, y per row, centre x, centre y.
-fn world_file(path: &Path) -> Option<(DVec2, DVec2)> {
-    let beside = ["tfw", "TFW", "tifw", "wld"].into_iter();
-    let text = beside.map(|e| path.with_extension(e)).find_map(|p| fs::read_to_string(p).ok())?;
+/// What a world file beside says, in six lines: x per column, y per column, x per row, y per row, and x and y
+/// of the centre of the first cell; `None` if there is no such file.
+fn world_file(path: &Path) -> Outcome<Option<Placement>> {
+    let beside = ["tfw", "TFW", "tifw", "wld"].map(|extension| path.with_extension(extension));
+    let Some((file, text)) =
+        beside.iter().find_map(|file| Some((file, fs::read_to_string(file).ok()?)))
+    else {
+        return Ok(None);
+    };
     let numbers: Vec<f64> = text.split_whitespace().map_while(|t| t.parse().ok()).collect();
     match numbers[..] {
-        [a, 0.0, 0.0, e, x, y] => {
-            check_step(DVec2::new(a, e)).ok().map(|step| (DVec2::new(x, y), step))
-        }
-        _ => None,
+        [a, 0.0, 0.0, e, x, y] => Ok(Some((DVec2::new(x, y), check_step(DVec2::new(a, e))?))),
+        [_, _, _, _, _, _] => unsupported(ROTATED),
+        _ => damaged(format!("the world file {} does not hold six numbers", file.display())),
     }
 }
 
@@ -213,10 +224,11 @@ fn void_nodata(
         }
     }
     super::void_infinite(values);
-    for (value, _) in
-        values.iter_mut().zip(mask.unwrap_or_default()).filter(|(_, valid)| matches!(valid, 0.0))
-    {
-        *value = f64::NAN;
+    for (value, valid) in values.iter_mut().zip(mask.unwrap_or_default()) {
+        // An absent part of the mask is `NaN`, and not valid.
+        if *valid == 0.0 || valid.is_nan() {
+            *value = f64::NAN;
+        }
     }
     let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
     // Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
@@ -274,7 +286,8 @@ fn height_unit(keys: &GeoKeys, metadata: &str) -> Outcome<Option<(&'static str, 
         return match named_unit(text) {
             Some(unit) => Ok(Some(unit)),
             None => unsupported(format!(
-                "the unit of the heights is `{text}`, which is not known; scale them to metres, for instance with `gdal_calc.py`"
+                "the unit of the heights is `{text}`, which is not known; scale them to metres, \
+                 for instance with `gdal_calc.py`"
             )),
         };
     }
@@ -486,12 +499,14 @@ mod tests {
         let terrain = crate::Terrain::open(&path).unwrap();
         assert_eq!(terrain.frame().step(), DVec2::ONE);
         assert_eq!(terrain.frame().origin(), DVec2::new(0.5, 1.5));
-        assert!(terrain.notes().iter().any(|n| n.contains("georeferenced")));
+        assert!(terrain.notes().iter().any(|n| n.contains("no place")));
         fs::write(path.with_extension("tfw"), "5\n0\n0\n-5\n1002.5\n2002.5\n").unwrap();
         let terrain = crate::Terrain::open(&path).unwrap();
         assert_eq!(terrain.frame().origin(), DVec2::new(1002.5, 2002.5));
         assert_eq!(terrain.frame().step(), DVec2::splat(5.0));
         assert_eq!(terrain.heights(), [1.0, 2.0, 3.0, 4.0]);
+        fs::write(path.with_extension("tfw"), "5\n1\n1\n-5\n1002.5\n2002.5\n").unwrap();
+        assert!(crate::Terrain::open(&path).unwrap_err().to_string().contains("gdalwarp"));
     }
 
     #[test]

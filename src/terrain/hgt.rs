@@ -23,7 +23,8 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
         return Err(Error::format(
             path,
             format!(
-                "a tile has 1201 × 1201 or 3601 × 3601 cells of two bytes, 2884802 or 25934402 bytes; this one has {}",
+                "a tile has 1201 × 1201 or 3601 × 3601 cells of two bytes, 2884802 or 25934402 bytes; \
+                 this one has {}",
                 bytes.len()
             ),
         ));

@@ -16,6 +16,8 @@ use std::path::Path;
 
 use glam::DVec2;
 
+pub mod synthetic;
+
 pub use self::crs::{Crs, GeoKeys};
 use crate::{Error, GridFrame, Result};
 

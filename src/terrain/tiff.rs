@@ -640,25 +640,23 @@ impl<'a> Layout<'a> {
             ));
         }
         values.resize(cells, f64::NAN);
-        values
+        // The first fault of the file, so that the message does not depend on the threads.
+        let fault = values
             .par_chunks_mut(self.chunk.1 * self.cols)
             .enumerate()
-            .try_for_each(|(down, rows)| self.read_chunk_row(band, down, rows))?;
-        Ok(values)
+            .find_map_first(|(down, rows)| self.read_chunk_row(band, down, rows).err());
+        fault.map_or(Ok(values), Err)
     }
 
     /// Fills the rows that one row of chunks covers.
     fn read_chunk_row(&self, band: usize, down: usize, rows: &mut [f64]) -> Outcome<()> {
         let across = self.chunks_across();
         let (plane, first) = if self.planar { (band, 0) } else { (0, band) };
-        let here = rows.len() / self.cols;
+        // A tile is whole even where the image ends within it; the last strip is not.
+        let chunk_rows = if self.tiled { self.chunk.1 } else { rows.len() / self.cols };
         for tile in 0..across {
             let index = (plane * self.chunks_down() + down) * across + tile;
-            let Some(bytes) =
-                self.read_chunk(index, if self.tiled { self.chunk.1 } else { here })?
-            else {
-                continue;
-            };
+            let Some(bytes) = self.read_chunk(index, chunk_rows)? else { continue };
             let left = tile * self.chunk.0;
             let width = self.chunk.0.min(self.cols - left);
             let stored_rows = bytes.chunks_exact(self.row_bytes);
