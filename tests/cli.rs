@@ -287,7 +287,8 @@ fn quiet_is_silent_and_scripts_are_printed() {
     let outcome = folder.run("route plain.tif --start pixel:5,5 --goal pixel:30,20 -q");
     assert_eq!((outcome.code, outcome.out.as_str(), outcome.err.as_str()), (0, "", ""));
     assert!(folder.good("completions bash").contains("ridgeway"));
-    assert!(folder.good("man").contains(".TH ridgeway"));
+    let manual = folder.good("man");
+    assert!(manual.contains(".TH ridgeway 1") && manual.contains(".TH ridgeway-route 1"));
     assert!(folder.good("--version").starts_with("ridgeway "));
 }
 

@@ -298,9 +298,17 @@ pub(crate) struct FitArgs {
     /// Degree of the B-spline.
     #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
     pub(crate) degree: DegreeName,
-    /// Cut-off wavelength: metres, `16cells`, `auto` (cross-validation), or 0 to go through every
-    /// height [default: 16cells].
-    #[arg(long, value_name = "METRES", value_parser = smoothing, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "METRES",
+        value_parser = smoothing,
+        allow_hyphen_values = true,
+        help = format!(
+            "Cut-off wavelength: metres, a number of cells such as 16cells, auto (cross-validation), \
+             or 0 to go through every height [default: {}cells]",
+            FitOptions::DEFAULT_CUTOFF_CELLS
+        )
+    )]
     pub(crate) smooth: Option<Smoothing>,
     /// As few knots as keep the root-mean-square residual under this many metres.
     #[arg(long, value_name = "M", conflicts_with = "smooth", value_parser = positive, allow_hyphen_values = true)]

@@ -25,15 +25,14 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Prints the form the flags ask for.
+    /// Prints the form the flags ask for, or nothing.
     pub(crate) fn print(&self, run: &RunArgs) -> Result<()> {
-        if run.json {
-            print(&format!("{:#}\n", self.json))
-        } else if run.quiet {
-            Ok(())
-        } else {
-            print(&self.text)
-        }
+        if run.quiet && !run.json { Ok(()) } else { self.print_always(run) }
+    }
+
+    /// Prints also where `--quiet` was given: for commands whose report is all they do.
+    pub(crate) fn print_always(&self, run: &RunArgs) -> Result<()> {
+        if run.json { print(&format!("{:#}\n", self.json)) } else { print(&self.text) }
     }
 }
 

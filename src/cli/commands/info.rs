@@ -10,7 +10,7 @@ use crate::report::{Facts, Report, coordinate, digits, metres};
 pub(super) fn run(args: &InfoArgs, run: &RunArgs) -> Result<()> {
     let terrain = plan::open(&args.dem, run)?;
     let report = Report { text: text(args, &terrain), json: machine(args, &terrain) };
-    report.print(&RunArgs { quiet: false, ..*run })
+    report.print_always(run)
 }
 
 fn text(args: &InfoArgs, terrain: &Terrain) -> String {

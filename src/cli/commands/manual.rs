@@ -12,10 +12,16 @@ pub(super) fn completions(shell: clap_complete::Shell) -> Result<()> {
     print(&String::from_utf8_lossy(&script))
 }
 
+/// The page of the command, followed by one for each of its own.
 pub(super) fn page() -> Result<()> {
-    let mut page = Vec::new();
-    clap_mangen::Man::new(Cli::command())
-        .render(&mut page)
-        .map_err(|source| Error::io("standard output", source))?;
-    print(&String::from_utf8_lossy(&page))
+    let mut command = Cli::command();
+    command.build();
+    let commands = command.get_subcommands().filter(|c| !c.is_hide_set() && c.get_name() != "help");
+    let mut pages = Vec::new();
+    for command in std::iter::once(&command).chain(commands) {
+        clap_mangen::Man::new(command.clone())
+            .render(&mut pages)
+            .map_err(|source| Error::io("standard output", source))?;
+    }
+    print(&String::from_utf8_lossy(&pages))
 }

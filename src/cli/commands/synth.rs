@@ -54,5 +54,5 @@ fn list(run: &RunArgs) -> Result<()> {
     }
     let kinds =
         SyntheticKind::ALL.map(|k| json!({ "name": k.name(), "description": k.description() }));
-    Report { text: facts.to_string(), json: json!(kinds) }.print(run)
+    Report { text: facts.to_string(), json: json!(kinds) }.print_always(run)
 }
