@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 use ridgeway::route::trace;
+use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
     Control, Crs, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground, HeightSurface,
     Metric, MetricField, Modifiers, Smoothing, Solver, Sym2, Terrain,
@@ -23,7 +24,8 @@ fn main() -> Result<(), Error> {
     constants()?;
     cylinder()?;
     sphere()?;
-    routes()
+    routes()?;
+    rounding()
 }
 
 /// A square of `n × n` nodes and side 1 m, centred at (0, 0).
@@ -206,4 +208,45 @@ fn routes() -> Result<(), Error> {
     }
     println!("| diffeomorphism | {} |", cells.join(" | "));
     Ok(())
+}
+
+/// How much of the curvature is noise when heights are rounded to whole metres, as SRTM's are, by the cut-off of
+/// the fit: the root-mean-square change of the curvatures over the root-mean-square curvature.
+fn rounding() -> Result<(), Error> {
+    let cutoffs = [0.0, 3.0, 4.0, 6.0, 8.0];
+    println!(
+        "\nCurvature that is noise of heights in whole metres, 30 m cells, by cut-off in cells"
+    );
+    println!("| terrain | {} |", cutoffs.map(|c| c.to_string()).join(" | "));
+    println!("|---|---|---|---|---|---|");
+    for kind in [SyntheticKind::Range, SyntheticKind::Craters, SyntheticKind::Plane] {
+        let heights = Synthetic::new(kind, 301, 301, 30.0)?.with_seed(1).heights();
+        let rounded = heights.iter().map(|z| z.round()).collect();
+        let frame = GridFrame::new(301, 301, DVec2::ZERO, DVec2::splat(30.0), Ground::METRES)?;
+        let [exact, rounded] =
+            [heights, rounded].map(|heights| Terrain::new(frame.clone(), heights, Crs::none()));
+        let (exact, rounded) = (exact?, rounded?);
+        let noise = cutoffs.map(|cells| {
+            let smoothing =
+                if cells > 0.0 { Smoothing::CutoffCells(cells) } else { Smoothing::Interpolate };
+            let options = FitOptions { smoothing, ..FitOptions::default() };
+            let fit = |terrain| HeightSurface::fit(terrain, &options, &Control::default());
+            Ok::<_, Error>(curvature_change(&fit(&exact)?, &fit(&rounded)?))
+        });
+        let cells = noise.into_iter().collect::<Result<Vec<_>, _>>()?;
+        println!("| {kind} | {} |", cells.join(" | "));
+    }
+    Ok(())
+}
+
+fn curvature_change(exact: &HeightSurface, rounded: &HeightSurface) -> String {
+    let frame = exact.frame();
+    let mut sum = 0.0;
+    for i in 0..frame.nodes() {
+        let at = DVec2::new((i % frame.cols()) as f64, (i / frame.cols()) as f64);
+        let [a, b] = [exact, rounded].map(|surface| surface.jet(at).curvature().principal);
+        sum += 0.5 * ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2));
+    }
+    let change = (sum / frame.nodes() as f64).sqrt();
+    format!("{:.1e} of {:.1e} 1/m", change, exact.rms_curvature())
 }
