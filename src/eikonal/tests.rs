@@ -91,6 +91,36 @@ fn a_diffeomorphism_pulls_straight_lines_back() {
 }
 
 #[test]
+fn sheared_and_stretched_grids_see_the_same_distance() {
+    // Speed 1 + x: the half-plane model of hyperbolic geometry, distance arcosh(1 + |p|²/(2(1+x))) from the origin.
+    let exact = |p: DVec2| (1.0 + p.length_squared() / (2.0 * (1.0 + p.x))).acosh();
+    for (across, down) in [
+        (DVec2::new(1.0, 0.0), DVec2::new(0.0, 1.0)),
+        (DVec2::new(1.0, 0.0), DVec2::new(0.6, 1.0)),
+        (DVec2::new(0.5, 0.0), DVec2::new(0.0, 1.0)),
+        (DVec2::new(0.9, -0.3), DVec2::new(0.4, 0.8)),
+    ] {
+        let error = [101, 201, 401].map(|n| {
+            let h = 0.8 / (n - 1) as f64;
+            let centre = DVec2::splat((n / 2) as f64);
+            let at = |c: usize, r: usize| {
+                let q = (DVec2::new(c as f64, r as f64) - centre) * h;
+                across * q.x + down * q.y
+            };
+            // D in index coordinates: speed² A⁻¹A⁻ᵀ with the columns of A the steps of the grid, so M = AᵀA/speed².
+            let gram = Sym2::new(across.length_squared(), across.dot(down), down.length_squared());
+            let tensor = |c, r| Some((gram * (h / (1.0 + at(c, r).x)).powi(2)).inverse());
+            let map = solve(field(n, n, tensor), centre);
+            errors(&map, |c, r| Some(exact(at(c, r))).filter(|&g| g < 0.2)).1
+        });
+        assert!(
+            error[2] < 4e-3 && order(error[0], error[2], 4.0) > 0.6,
+            "{across} {down}: {error:?}"
+        );
+    }
+}
+
+#[test]
 fn no_direction_is_favoured_on_a_plane() {
     let n = 441;
     let centre = DVec2::splat(220.0);
