@@ -88,14 +88,14 @@ impl Solver {
     }
 }
 
-/// Whether the open corners of the goal's cell have values below `limit`.
+/// Whether the open corners of the goal's cell have values that no news from `limit` on can change.
 fn is_settled(field: &TensorField, values: &Values, goal: DVec2, limit: f32) -> bool {
     let (col, row) = (goal.x.max(0.0) as usize, goal.y.max(0.0) as usize);
     let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (col + i, row + j));
     corners
         .into_iter()
         .filter(|&(c, r)| c < field.cols() && r < field.rows() && field.is_open(c, r))
-        .all(|(c, r)| values.get(c, r) < limit)
+        .all(|(c, r)| values.get(c, r) + field.longest_step[field.tiling.place(c, r).0] < limit)
 }
 
 /// Distance from the start region at every node.

@@ -114,7 +114,7 @@ fn sheared_and_stretched_grids_see_the_same_distance() {
             errors(&map, |c, r| Some(exact(at(c, r))).filter(|&g| g < 0.2)).1
         });
         assert!(
-            error[2] < 4e-3 && order(error[0], error[2], 4.0) > 0.6,
+            error[2] < 4e-3 && order(error[0], error[2], 4.0) > 0.45,
             "{across} {down}: {error:?}"
         );
     }
@@ -245,7 +245,7 @@ fn any_tensor() -> impl Strategy<Value = Option<Sym2>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
     fn agrees_with_the_reference_on_rough_fields(
@@ -265,8 +265,25 @@ proptest! {
         for row in 0..37 {
             for col in 0..24 {
                 let (a, b) = (fast.at_node(col, row), slow.at_node(col, row));
-                prop_assert!(a == b || (a - b).abs() <= 1e-4 * b, "({col}, {row}): {a} {b}");
+                prop_assert!(a == b || (a - b).abs() <= 3e-5 * b, "({col}, {row}): {a} {b}");
             }
+        }
+    }
+
+    #[test]
+    fn an_early_end_changes_no_goal(
+        tensors in proptest::collection::vec(any_tensor(), 60 * 50),
+        (x, y) in (0.0..59.0f64, 0.0..49.0f64),
+        goal in (0.0..59.0f64, 0.0..49.0f64),
+    ) {
+        let f = field(60, 50, |c, r| tensors[r * 60 + c]);
+        let start = StartRegion::from(DVec2::new(x, y));
+        let goal = DVec2::from(goal);
+        let solver = Solver { tolerance: 0.0 };
+        let control = Control::default();
+        if let Ok(whole) = solver.solve_field(f.clone(), &start, &[], &control) {
+            let part = solver.solve_field(f, &start, &[goal], &control).unwrap();
+            prop_assert_eq!(part.at(goal), whole.at(goal));
         }
     }
 

@@ -108,7 +108,7 @@ struct Queue {
     waiting: Vec<u32>,
     /// Least value that may still change the tile; [`UNREACHED`] if it does not wait.
     key: Vec<f32>,
-    /// Largest value in the tile: news above it are none.
+    /// News above this cannot improve the tile, see [`settle`].
     ceiling: Vec<f32>,
     /// Direction the last news came from, as the first sweep to make: bit 0 from the east, bit 1 from the south.
     heading: Vec<u8>,
@@ -163,7 +163,8 @@ fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize
 
 /// Relaxes `values` to the solution of the discrete equation, starting from the tiles that hold any.
 ///
-/// `done(limit, values)` is asked between rounds whether values below `limit`, which are final, are enough.
+/// `done(limit, values)` is asked between rounds whether what is final is enough: values that are lower than `limit` by
+/// more than the longest step of their tile.
 pub(super) fn solve(
     field: &TensorField,
     values: &mut Values,
@@ -255,11 +256,15 @@ fn heading(dx: isize, dy: isize) -> u8 {
 }
 
 /// Writes a solved tile back and wakes the neighbours it can improve.
+///
+/// On an anisotropic metric a node's value may come from a segment of which one end is *higher* than the node. The
+/// other end `a` is lower, and the higher one `b` matters only while `gb − ga` is less than the length of the
+/// segment, so news are of interest up to the largest value of a tile and its longest step.
 fn settle(field: &TensorField, values: &mut Values, queue: &mut Queue, outcome: &Outcome) {
     let tile = outcome.tile as usize;
     values.tiles[tile] = outcome.values;
     let open = outcome.values.iter().zip(&field.tiles[tile].det).filter(|&(_, &det)| det > 0.0);
-    queue.ceiling[tile] = open.map(|(&g, _)| g).fold(0.0, f32::max);
+    queue.ceiling[tile] = open.map(|(&g, _)| g).fold(0.0, f32::max) + field.longest_step[tile];
     if !outcome.settled {
         let least = outcome.values.iter().copied().fold(UNREACHED, f32::min);
         queue.wake(tile, least, queue.heading[tile]);
