@@ -228,8 +228,9 @@ pub(super) fn solve(
     Ok(statistics)
 }
 
-/// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a
-/// round but solves some too early.
+/// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a round but solves
+/// some too early. On a range of 1001² nodes, curvature metric: 4, 8, 16, 32 give 4.6, 4.5, 4.4, 4.5
+/// activations per tile in 1244, 875, 652, 545 rounds; isotropic 3.9, 3.7, 3.6, 3.6 in 1313, 1052, 799, 774.
 const WINDOW_CELLS: f32 = 16.0;
 
 /// Fewest tiles of a round that are worth waking other threads for.
