@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use ridgeway::export::{Band, Samples, check_free, write_file, write_geotiff};
-use ridgeway::terrain::GeoKeys;
 use ridgeway::{Error, Result, Terrain};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can
@@ -85,17 +84,11 @@ pub(crate) fn write_raster(
     terrain: &Terrain,
     bands: &[(String, Vec<f32>)],
 ) -> Result<()> {
-    let crs = terrain.crs();
-    let keys = match (crs.geo_keys(), crs.epsg()) {
-        (Some(keys), _) => keys.clone(),
-        (None, Some(code)) => GeoKeys::from_epsg(code, crs.is_geographic()),
-        (None, None) => GeoKeys::default(),
-    };
     let bands: Vec<_> = bands
         .iter()
         .map(|(description, values)| Band { description, samples: Samples::F32(values) })
         .collect();
-    write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), &keys, &bands))
+    write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), terrain.crs(), &bands))
 }
 
 /// Writes a file whose content is ready.

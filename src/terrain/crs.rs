@@ -4,6 +4,7 @@
 //! notation). Datum shifts are three- or seven-parameter ones; grid files are not at hand, and where that
 //! matters [`Crs::caveat`] says how much.
 
+use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
 
 use glam::DVec2;
@@ -26,13 +27,13 @@ pub struct Crs {
 
 /// The GeoKey directory of a GeoTIFF and the values it points to (OGC 19-008r4, section 7.1).
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct GeoKeys {
+pub(crate) struct GeoKeys {
     /// Tag 34735: version, revision, minor revision, number of keys; then four numbers a key.
-    pub directory: Vec<u16>,
+    pub(crate) directory: Vec<u16>,
     /// Tag 34736.
-    pub doubles: Vec<f64>,
-    /// Tag 34737, without the final NUL.
-    pub ascii: String,
+    pub(crate) doubles: Vec<f64>,
+    /// Tag 34737, without the final NUL. Bytes, as the keys count them: files hold Latin-1 and UTF-8 too.
+    pub(crate) ascii: Vec<u8>,
 }
 
 /// A projection and the PROJ.4 text it was made from.
@@ -230,12 +231,16 @@ impl Crs {
         self.caveat.as_deref()
     }
 
-    /// The GeoKeys of the GeoTIFF it was read from, to be written back where there is no EPSG code.
+    /// What a GeoTIFF says of this CRS: the GeoKeys of the file it was read from, else its EPSG code; empty if
+    /// there is neither.
     ///
-    /// The horizontal part only, and always for `PixelIsArea`, whatever the file had.
-    #[must_use]
-    pub fn geo_keys(&self) -> Option<&GeoKeys> {
-        self.keys.as_deref()
+    /// The horizontal part only, as heights are in metres here, and always for `PixelIsArea`.
+    pub(crate) fn geo_keys(&self) -> GeoKeys {
+        match (&self.keys, self.epsg) {
+            (Some(keys), _) => GeoKeys::clone(keys),
+            (None, Some(code)) => GeoKeys::from_epsg(code, self.is_geographic()),
+            (None, None) => GeoKeys::default(),
+        }
     }
 
     /// Longitude (−180 to 180) and latitude in degrees of map coordinates: on WGS84 for the Earth, on its own
@@ -473,6 +478,21 @@ pub(super) mod key {
 }
 
 impl GeoKeys {
+    /// The keys that name an EPSG code (OGC 19-008r4, sections 7.4 and 7.5); none if it does not fit 16 bits.
+    fn from_epsg(code: u32, geographic: bool) -> Self {
+        let Ok(code) = u16::try_from(code) else { return Self::default() };
+        // 1 is projected, 2 geographic.
+        let (model, crs) =
+            if geographic { (2, key::GEOGRAPHIC_CRS) } else { (1, key::PROJECTED_CRS) };
+        let directory = [
+            [1, 1, 0, 3],
+            [key::MODEL_TYPE, 0, 1, model],
+            [key::RASTER_TYPE, 0, 1, 1],
+            [crs, 0, 1, code],
+        ];
+        Self { directory: directory.concat(), ..Self::default() }
+    }
+
     /// `(location, count, value or offset)` of a key.
     fn find(&self, key: u16) -> Option<(u16, usize, u16)> {
         let (entries, _) = self.directory.get(4..)?.as_chunks::<4>();
@@ -494,25 +514,27 @@ impl GeoKeys {
         (location == 34736).then(|| self.doubles.get(usize::from(offset)).copied()).flatten()
     }
 
-    fn text(&self, key: u16) -> Option<&str> {
+    fn text(&self, key: u16) -> Option<Cow<'_, str>> {
         let (location, count, offset) = self.find(key)?;
         let start = usize::from(offset);
         let text = (location == 34737).then(|| self.ascii.get(start..start + count)).flatten()?;
-        text.split('|').next().filter(|t| !t.is_empty())
+        let text = text.split(|b| *b == b'|').next().filter(|t| !t.is_empty())?;
+        Some(String::from_utf8_lossy(text))
     }
 
     /// Without the vertical part, and for `PixelIsArea`.
-    fn horizontal(&self) -> Self {
-        let (entries, _) = self.directory.get(4..).unwrap_or_default().as_chunks::<4>();
-        let entries: Vec<_> = entries
-            .iter()
-            .filter(|e| e[0] < key::VERTICAL_CRS)
-            .map(|e| if e[0] == key::RASTER_TYPE { [key::RASTER_TYPE, 0, 1, 1] } else { *e })
-            .collect();
-        let mut directory = self.directory.get(..3).unwrap_or(&[1, 1, 0]).to_vec();
-        directory.push(entries.len() as u16);
-        directory.extend(entries.iter().flatten());
-        Self { directory, doubles: self.doubles.clone(), ascii: self.ascii.clone() }
+    fn horizontal(self) -> Self {
+        let Some((header, entries)) = self.directory.split_at_checked(4) else {
+            return Self::default();
+        };
+        let (entries, _) = entries.as_chunks::<4>();
+        let kept = entries.iter().filter(|e| e[0] < key::VERTICAL_CRS && e[0] != key::RASTER_TYPE);
+        let mut kept: Vec<_> = kept.copied().chain([[key::RASTER_TYPE, 0, 1, 1]]).collect();
+        // Keys ascend; of two alike the first counts, as it does for `find`.
+        kept.sort_by_key(|e| e[0]);
+        kept.dedup_by_key(|e| e[0]);
+        let directory = [&header[..3], &[kept.len() as u16], &kept.concat()].concat();
+        Self { directory, ..self }
     }
 
     /// Metres per unit of a projected CRS; metres if nothing is said.
@@ -530,9 +552,9 @@ impl GeoKeys {
         })
     }
 
-    fn crs_name(&self) -> &str {
+    fn crs_name(&self) -> Cow<'_, str> {
         let citations = [key::PROJECTED_CITATION, key::CITATION, key::GEOGRAPHIC_CITATION];
-        citations.iter().find_map(|k| self.text(*k)).unwrap_or("unnamed")
+        citations.iter().find_map(|k| self.text(*k)).unwrap_or("unnamed".into())
     }
 
     /// A CRS of which only the unit is known, and perhaps a code.
@@ -541,14 +563,14 @@ impl GeoKeys {
         let metres = self.metres_per_unit().ok()?;
         Some(Crs {
             epsg: self.code(key::PROJECTED_CRS),
-            ..Crs::named(self.crs_name(), &unit_name(metres), metres)
+            ..Crs::named(&self.crs_name(), &unit_name(metres), metres)
         })
     }
 
     fn user_projected_crs(&self) -> Result<Crs> {
         let name = self.crs_name();
         let metres = self.metres_per_unit()?;
-        let plain = Crs::named(name, &unit_name(metres), metres);
+        let plain = Crs::named(&name, &unit_name(metres), metres);
         if name.contains("Pseudo-Mercator") || name.contains("Web_Mercator") {
             return Crs::from_epsg(3857);
         }
@@ -557,7 +579,7 @@ impl GeoKeys {
             return Ok(plain);
         };
         let definition = format!("{conversion} {datum} +to_meter={metres} +no_defs");
-        Ok(match Crs::from_proj(&definition, name) {
+        Ok(match Crs::from_proj(&definition, &name) {
             Ok(crs) => Crs { caveat: crs.caveat.or(caveat), ..crs },
             Err(_) => plain,
         })
@@ -575,7 +597,7 @@ impl GeoKeys {
                 "a geographic CRS without an ellipsoid; name the right one with `gdal_edit.py -a_srs EPSG:...`",
             ));
         };
-        let crs = Crs::from_proj(&format!("+proj=longlat {datum} +no_defs"), self.crs_name())?;
+        let crs = Crs::from_proj(&format!("+proj=longlat {datum} +no_defs"), &self.crs_name())?;
         Ok(Crs { caveat: crs.caveat.or(caveat), ..crs })
     }
 
@@ -774,14 +796,33 @@ mod tests {
             [3082, 34736, 1, 2],
             [4099, 0, 1, 9002],
         ];
-        let keys = GeoKeys { directory: directory.concat(), doubles, ascii: String::new() };
+        let keys = GeoKeys { directory: directory.concat(), doubles, ascii: Vec::new() };
         let crs = Crs::from_geo_keys(keys).unwrap();
         let utm = Crs::from_epsg(32631).unwrap();
         let at = DVec2::new(400_000.0, 4_700_000.0);
         assert_near(crs.to_lonlat(at / 0.3048).unwrap(), utm.to_lonlat(at).unwrap(), 1e-9);
-        let kept = crs.geo_keys().unwrap();
+        let kept = crs.geo_keys();
         assert_eq!(kept.short(key::RASTER_TYPE), Some(1));
         assert_eq!(kept.short(key::VERTICAL_UNITS), None);
         assert_eq!(kept.directory.len(), 4 * (1 + usize::from(kept.directory[3])));
+    }
+
+    #[test]
+    fn geo_keys_come_from_the_file_or_the_code() {
+        let utm = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32631];
+        assert_eq!(Crs::from_epsg(32631).unwrap().geo_keys().directory, utm);
+        assert_eq!(Crs::from_epsg(4326).unwrap().geo_keys().directory[12..], [2048, 0, 1, 4326]);
+        assert_eq!(Crs::none().geo_keys(), GeoKeys::default());
+        // Points, with feet for the heights, a key twice and out of order.
+        let directory = [
+            [1, 1, 0, 5],
+            [1025, 0, 1, 2],
+            [1024, 0, 1, 1],
+            [3072, 0, 1, 32631],
+            [3072, 0, 1, 32632],
+            [4099, 0, 1, 9002],
+        ];
+        let keys = GeoKeys { directory: directory.concat(), ..GeoKeys::default() };
+        assert_eq!(Crs::from_geo_keys(keys).unwrap().geo_keys().directory, utm);
     }
 }
