@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use ridgeway::export::{Band, Samples, check_free, write_file, write_geotiff};
+use ridgeway::export::{Band, Samples, check_folder_free, check_free, write_file, write_geotiff};
 use ridgeway::{Error, Result, Terrain};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can
@@ -34,7 +34,7 @@ pub(crate) fn check_file(
         )));
     }
     check_free(path, overwrite)?;
-    check_writable(path)?;
+    check_writable(folder_of(path))?;
     Ok(extension)
 }
 
@@ -43,19 +43,8 @@ pub(crate) fn check_file(
 /// # Errors
 /// It is a file; one of the files exists and may not be replaced; the place is missing or not writable.
 pub(crate) fn check_outputs_in(path: &Path, names: &[&str], overwrite: bool) -> Result<()> {
-    if path.is_file() {
-        return Err(Error::usage(format!("{}: is a file; name a folder", path.display())));
-    }
-    if !path.is_dir() {
-        check_free(path, overwrite)?;
-        return check_writable(path);
-    }
-    for name in names {
-        let file = path.join(name);
-        check_free(&file, overwrite)?;
-        check_writable(&file)?;
-    }
-    Ok(())
+    check_folder_free(path, names, overwrite)?;
+    check_writable(if path.is_dir() { path } else { folder_of(path) })
 }
 
 /// Refuses to name one output twice.
@@ -68,10 +57,13 @@ pub(crate) fn check_distinct(paths: &[&PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Checks that a file can be made beside `path`, by making one without a name.
-fn check_writable(path: &Path) -> Result<()> {
-    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+/// Checks that files can be made in a folder, by making one without a name.
+fn check_writable(folder: &Path) -> Result<()> {
     tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }
 
 /// Writes bands, each with what it holds and its unit, on the grid of the terrain.
