@@ -3,8 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use ridgeway::export::{Band, Samples, check_free, write_file, write_geotiff};
-use ridgeway::terrain::GeoKeys;
+use ridgeway::export::{Band, Samples, check_folder_free, check_free, write_file, write_geotiff};
 use ridgeway::{Error, Result, Terrain};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can
@@ -35,7 +34,7 @@ pub(crate) fn check_file(
         )));
     }
     check_free(path, overwrite)?;
-    check_writable(path)?;
+    check_writable(folder_of(path))?;
     Ok(extension)
 }
 
@@ -44,19 +43,8 @@ pub(crate) fn check_file(
 /// # Errors
 /// It is a file; one of the files exists and may not be replaced; the place is missing or not writable.
 pub(crate) fn check_outputs_in(path: &Path, names: &[&str], overwrite: bool) -> Result<()> {
-    if path.is_file() {
-        return Err(Error::usage(format!("{}: is a file; name a folder", path.display())));
-    }
-    if !path.is_dir() {
-        check_free(path, overwrite)?;
-        return check_writable(path);
-    }
-    for name in names {
-        let file = path.join(name);
-        check_free(&file, overwrite)?;
-        check_writable(&file)?;
-    }
-    Ok(())
+    check_folder_free(path, names, overwrite)?;
+    check_writable(if path.is_dir() { path } else { folder_of(path) })
 }
 
 /// Refuses to name one output twice.
@@ -69,10 +57,13 @@ pub(crate) fn check_distinct(paths: &[&PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Checks that a file can be made beside `path`, by making one without a name.
-fn check_writable(path: &Path) -> Result<()> {
-    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+/// Checks that files can be made in a folder, by making one without a name.
+fn check_writable(folder: &Path) -> Result<()> {
     tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }
 
 /// Writes bands, each with what it holds and its unit, on the grid of the terrain.
@@ -85,17 +76,11 @@ pub(crate) fn write_raster(
     terrain: &Terrain,
     bands: &[(String, Vec<f32>)],
 ) -> Result<()> {
-    let crs = terrain.crs();
-    let keys = match (crs.geo_keys(), crs.epsg()) {
-        (Some(keys), _) => keys.clone(),
-        (None, Some(code)) => GeoKeys::from_epsg(code, crs.is_geographic()),
-        (None, None) => GeoKeys::default(),
-    };
     let bands: Vec<_> = bands
         .iter()
         .map(|(description, values)| Band { description, samples: Samples::F32(values) })
         .collect();
-    write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), &keys, &bands))
+    write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), terrain.crs(), &bands))
 }
 
 /// Writes a file whose content is ready.

@@ -93,9 +93,12 @@ impl<'a> Journey<'a> {
         };
         let field = metric.on(&self.surface, &modifiers)?;
         for spot in self.starts.iter().chain(&self.goals) {
-            let why = match self.args.metric.max_slope {
-                Some(_) => "lies on ground steeper than --max-slope allows",
-                None => "lies where --tensor has no value",
+            let why = match (name, self.args.metric.max_slope) {
+                (MetricName::Tensor, Some(_)) => {
+                    "lies where --tensor has no value or the ground is steeper than --max-slope allows"
+                }
+                (_, Some(_)) => "lies on ground steeper than --max-slope allows",
+                (_, None) => "lies where --tensor has no value",
             };
             spot.check(&self.terrain, |col, row| field.is_open(col, row), why)?;
         }

@@ -50,7 +50,7 @@ pub fn check_folder_free(folder: impl AsRef<Path>, names: &[&str], overwrite: bo
     if folder.is_dir() {
         names.iter().try_for_each(|name| check_free(folder.join(name), overwrite))
     } else if folder.exists() {
-        Err(Error::usage(format!("{} is a file; a folder is needed", folder.display())))
+        Err(Error::usage(format!("{}: is a file; name a folder", folder.display())))
     } else {
         check_free(folder, overwrite)
     }
@@ -83,9 +83,9 @@ pub fn write_file(
     put().map_err(|e| Error::io(path, e))
 }
 
-/// Fills the folder `path` by `fill`, which is given an empty temporary folder beside it. When
-/// `fill` has succeeded, the new folder is renamed into place; if a folder is already there, each
-/// file produced is moved into it, and files of other names stay as they are.
+/// Fills the folder `path` by `fill`, which is given an empty temporary folder: beside it, and renamed into
+/// place when `fill` has succeeded; or, if a folder is already there, inside it (its parent may be closed to
+/// us or on another disk), whose files are then moved up, and files of other names stay as they are.
 ///
 /// # Errors
 /// [`Error::Usage`] if the parent is missing, `path` is no folder, or a file to be placed exists and
@@ -97,16 +97,16 @@ pub fn write_folder(
 ) -> Result<()> {
     let path = path.as_ref();
     check_folder_free(path, &[], overwrite)?;
-    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    let exists = path.is_dir();
     let temporary = tempfile::Builder::new()
         .prefix(".ridgeway-")
-        .tempdir_in(parent(&place))
+        .tempdir_in(if exists { path } else { parent(path) })
         .map_err(|e| Error::io(path, e))?;
     fill(temporary.path())?;
-    if place.exists() {
-        move_files(temporary.path(), &place, overwrite)
+    if exists {
+        move_files(temporary.path(), path, overwrite)
     } else {
-        fs::rename(temporary.keep(), &place).map_err(|e| Error::io(path, e))
+        fs::rename(temporary.path(), path).map_err(|e| Error::io(path, e))
     }
 }
 

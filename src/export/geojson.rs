@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
 
 use super::isolines::Isoline;
+use super::round;
 use crate::terrain::Crs;
 use crate::{GridFrame, Result, Route};
 
@@ -128,10 +129,6 @@ fn geometry(lines: &[Vec<DVec3>]) -> GeometryValue {
 
 /// The position to 7 decimals (a centimetre, if degrees) and the height to 2, or none if `NaN`.
 fn position(p: DVec3) -> Position {
-    let round = |v: f64, decimals: i32| {
-        let scale = 10f64.powi(decimals);
-        (v * scale).round() / scale
-    };
     let [x, y] = [p.x, p.y].map(|v| round(v, 7));
     if p.z.is_finite() { Position::from([x, y, round(p.z, 2)]) } else { Position::from([x, y]) }
 }

@@ -15,8 +15,8 @@ use tiff::tags::{
 };
 use tiff::{TiffError, TiffResult};
 
-use crate::GridFrame;
 use crate::terrain::GeoKeys;
+use crate::{Crs, GridFrame};
 
 /// Side of a tile in pixels, GDAL's default.
 const TILE: usize = 256;
@@ -25,10 +25,6 @@ const LEVEL: u32 = 3;
 /// Most bytes of samples in a classic TIFF. Its limit is 4 GB; the rest is room for the padding of
 /// edge tiles and for data that Deflate cannot shorten.
 const CLASSIC_BYTES: usize = 3 << 30;
-/// `GTRasterTypeGeoKey`: 1 where pixels are areas, 2 where they are points.
-const RASTER_TYPE: u16 = 1025;
-/// The keys of a vertical CRS.
-const VERTICAL_KEYS: std::ops::RangeInclusive<u16> = 4096..=4099;
 /// `GDAL_METADATA`, TIFF tag 42112: an XML text that GDAL-based programs read band names from.
 const GDAL_METADATA: Tag = Tag::Unknown(42112);
 
@@ -50,36 +46,6 @@ pub enum Samples<'a> {
     U32(&'a [u32]),
     /// Classes; 0 is nodata.
     U8(&'a [u8]),
-}
-
-impl GeoKeys {
-    /// The keys that name an EPSG code (OGC GeoTIFF 1.1, sections 7.4 and 7.5). A code beyond 16 bits
-    /// cannot be named and gives no keys.
-    #[must_use]
-    pub fn from_epsg(code: u32, geographic: bool) -> Self {
-        // GTModelType: 1 projected, 2 geographic; then the key that holds the code.
-        let (model, key) = if geographic { (2, 2048) } else { (1, 3072) };
-        let directory = u16::try_from(code).map_or_else(
-            |_| Vec::new(),
-            |code| vec![1, 1, 0, 3, 1024, 0, 1, model, RASTER_TYPE, 0, 1, 1, key, 0, 1, code],
-        );
-        Self { directory, ..Self::default() }
-    }
-
-    /// The directory as it is right for our files: pixels are areas, whatever the file was that the
-    /// keys come from, and nothing is said of heights, which are in metres here.
-    fn directory(&self) -> Vec<u16> {
-        let Some((header, keys)) = self.directory.split_at_checked(4) else { return Vec::new() };
-        let mut kept: Vec<[u16; 4]> = keys
-            .chunks_exact(4)
-            .filter(|key| key[0] != RASTER_TYPE && !VERTICAL_KEYS.contains(&key[0]))
-            .map(|key| [key[0], key[1], key[2], key[3]])
-            .chain([[RASTER_TYPE, 0, 1, 1]])
-            .collect();
-        kept.sort_unstable(); // keys must ascend
-        let count = u16::try_from(kept.len()).unwrap_or(u16::MAX);
-        [&header[..3], &[count], &kept.concat()].concat()
-    }
 }
 
 impl Samples<'_> {
@@ -115,7 +81,7 @@ impl Samples<'_> {
     }
 }
 
-/// Writes `bands` on `frame` as one GeoTIFF, bands in separate planes.
+/// Writes `bands` on `frame`, which lies in `crs`, as one GeoTIFF, bands in separate planes.
 ///
 /// # Errors
 /// Those of `out`; `InvalidInput` if there is no band, bands differ in type, a band has not one value
@@ -123,9 +89,10 @@ impl Samples<'_> {
 pub fn write_geotiff(
     out: impl Write + Seek,
     frame: &GridFrame,
-    keys: &GeoKeys,
+    crs: &Crs,
     bands: &[Band<'_>],
 ) -> io::Result<()> {
+    let keys = &crs.geo_keys();
     check(frame, bands).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
     let bytes: usize = bands.iter().map(|b| b.samples.len() * b.samples.bytes_per_sample()).sum();
     let written = if bytes > CLASSIC_BYTES {
@@ -213,14 +180,15 @@ fn write_place<W: Write + Seek, K: TiffKind>(
     let corner = frame.to_map(DVec2::splat(-0.5));
     directory.write_tag(Tag::ModelPixelScaleTag, [step.x, step.y, 0.0])?;
     directory.write_tag(Tag::ModelTiepointTag, [0.0, 0.0, 0.0, corner.x, corner.y, 0.0])?;
-    let keyed = keys.directory();
-    if !keyed.is_empty() {
-        directory.write_tag(Tag::GeoKeyDirectoryTag, &keyed[..])?;
+    if !keys.directory.is_empty() {
+        directory.write_tag(Tag::GeoKeyDirectoryTag, &keys.directory[..])?;
         if !keys.doubles.is_empty() {
             directory.write_tag(Tag::GeoDoubleParamsTag, &keys.doubles[..])?;
         }
         if !keys.ascii.is_empty() {
-            directory.write_tag(Tag::GeoAsciiParamsTag, &keys.ascii[..])?;
+            // A byte for a byte, so that the keys still find their texts.
+            let ascii = keys.ascii.iter().map(|b| if b.is_ascii() { char::from(*b) } else { '?' });
+            directory.write_tag(Tag::GeoAsciiParamsTag, &ascii.collect::<String>()[..])?;
         }
     }
     Ok(())
@@ -352,7 +320,7 @@ mod tests {
 
     fn written(frame: &GridFrame, bands: &[Band<'_>]) -> Vec<u8> {
         let mut out = Cursor::new(Vec::new());
-        write_geotiff(&mut out, frame, &GeoKeys::from_epsg(32631, false), bands).unwrap();
+        write_geotiff(&mut out, frame, &Crs::from_epsg(32631).unwrap(), bands).unwrap();
         out.into_inner()
     }
 
@@ -402,22 +370,24 @@ mod tests {
     }
 
     #[test]
-    fn keys_of_a_file_are_kept_but_for_pixel_kind_and_heights() {
+    fn foreign_letters_in_the_keys_keep_their_place() {
         let keys = GeoKeys {
-            directory: vec![
-                1, 1, 1, 4, 1024, 0, 1, 1, 1025, 0, 1, 2, 3072, 0, 1, 32631, 4099, 0, 1, 9002,
-            ],
+            directory: vec![1, 1, 0, 1, 1026, 34737, 7, 0],
+            ascii: b"R\xe9seau|".to_vec(),
             ..GeoKeys::default()
         };
-        assert_eq!(keys.directory(), [1, 1, 1, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32631]);
-        assert!(GeoKeys::default().directory().is_empty());
-        assert!(GeoKeys::from_epsg(100_000, false).directory().is_empty());
+        let floats = [0f32; 4];
+        let bands = [Band { description: "", samples: Samples::F32(&floats) }];
+        let mut out = Cursor::new(Vec::new());
+        write::<_, TiffKindStandard>(&mut out, &frame(2, 2), &keys, &bands).unwrap();
+        let mut tiff = Decoder::new(Cursor::new(out.into_inner())).unwrap();
+        assert_eq!(tiff.get_tag_ascii_string(Tag::GeoAsciiParamsTag).unwrap(), "R?seau|");
     }
 
     #[test]
     fn wrong_bands_are_refused() {
         let write = |bands: &[Band<'_>]| {
-            write_geotiff(Cursor::new(Vec::new()), &frame(2, 2), &GeoKeys::default(), bands)
+            write_geotiff(Cursor::new(Vec::new()), &frame(2, 2), &Crs::none(), bands)
         };
         let (floats, bytes) = ([0f32; 4], [0u8; 4]);
         let band = |samples| Band { description: "", samples };

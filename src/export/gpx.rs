@@ -3,6 +3,7 @@
 use ::gpx::{Gpx, GpxVersion, Track, TrackSegment, Waypoint};
 use glam::DVec2;
 
+use super::round;
 use crate::terrain::Crs;
 use crate::{Error, Result, Route};
 
@@ -56,12 +57,8 @@ fn track(name: &str, route: &Route, to_lonlat: impl Fn(DVec2) -> Result<DVec2>) 
 
 /// Longitude in [−180, 180), as the GPX schema asks, to 7 decimals.
 fn wrapped(lon: f64) -> f64 {
-    round((lon + 180.0).rem_euclid(360.0) - 180.0, 7)
-}
-
-fn round(value: f64, decimals: i32) -> f64 {
-    let scale = 10f64.powi(decimals);
-    (value * scale).round() / scale
+    let lon = round((lon + 180.0).rem_euclid(360.0) - 180.0, 7);
+    if lon == 180.0 { -180.0 } else { lon }
 }
 
 fn description(route: &Route) -> String {
@@ -107,5 +104,6 @@ mod tests {
     fn longitudes_are_wrapped() {
         assert_eq!(wrapped(181.0), -179.0);
         assert_eq!(wrapped(-180.0), -180.0);
+        assert_eq!(wrapped(179.999_999_99), -180.0);
     }
 }

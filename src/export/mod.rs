@@ -16,3 +16,9 @@ pub use self::geotiff::{Band, Samples, write_geotiff};
 pub use self::gpx::routes_gpx;
 pub use self::isolines::{Isoline, isolines, levels_by_step, round_step};
 pub use self::profile::write_profiles;
+
+/// `value` to so many decimals.
+fn round(value: f64, decimals: i32) -> f64 {
+    let scale = 10f64.powi(decimals);
+    (value * scale).round() / scale
+}

@@ -193,6 +193,9 @@ impl HeightSurface {
 
     /// Jets at all nodes of a row, into the first [`cols`](GridFrame::cols) of `jets`: much faster than
     /// one by one.
+    ///
+    /// # Panics
+    /// If `jets` is shorter than a row, or there is no such row.
     pub fn row_jets(&self, row: usize, jets: &mut [HeightJet]) {
         let per_metre = self.frame.spacing(row as f64).recip();
         let jets = &mut jets[..self.frame.cols()];

@@ -144,23 +144,50 @@ fn golden_section(low: f64, high: f64, f: impl Fn(f64) -> Result<f64>) -> Result
     Ok((low + high) / 2.0)
 }
 
-/// The part of at most 1024 × 1024 nodes, of nine spread over the grid, with the fewest voids.
+/// The part of at most 1024 × 1024 nodes with the fewest voids, and of those the nearest to the middle. The
+/// places it is chosen from leave no node out, so it holds a height if there is one.
 fn window(frame: &GridFrame, heights: &[f64]) -> Result<(GridFrame, Vec<f64>)> {
     const SIDE: usize = 1024;
     let (cols, rows) = (frame.cols().min(SIDE), frame.rows().min(SIDE));
-    let voids = |&(col, row): &(usize, usize)| {
+    let lines = |(col, row): (usize, usize)| {
         let lines = heights.chunks(frame.cols()).skip(row).take(rows);
-        lines.flat_map(|line| &line[col..col + cols]).filter(|z| !z.is_finite()).count()
+        lines.flat_map(move |line| &line[col..col + cols])
     };
-    // The middle first: it wins ties.
-    let thirds = |nodes: usize, side: usize| [1, 0, 2].map(|i| i * (nodes - side) / 2);
-    let (col, row) = thirds(frame.rows(), rows)
-        .into_iter()
-        .flat_map(|row| thirds(frame.cols(), cols).map(|col| (col, row)))
-        .min_by_key(voids)
-        .expect("nine places");
-    let corner = frame.to_map(DVec2::new(col as f64, row as f64));
+    // First nodes of windows that overlap or touch, an odd number, so that one is in the middle.
+    let spread = |nodes: usize, side: usize| {
+        let gaps = 2 * (nodes.div_ceil(side) / 2).max(1);
+        (0..=gaps).map(move |i| i * (nodes - side) / gaps)
+    };
+    let off_middle = |(col, row): (usize, usize)| {
+        (2 * col).abs_diff(frame.cols() - cols) + (2 * row).abs_diff(frame.rows() - rows)
+    };
+    let place = spread(frame.rows(), rows)
+        .flat_map(|row| spread(frame.cols(), cols).map(move |col| (col, row)))
+        .min_by_key(|&place| (lines(place).filter(|z| !z.is_finite()).count(), off_middle(place)))
+        .unwrap_or_default();
+    let corner = frame.to_map(DVec2::new(place.0 as f64, place.1 as f64));
     let part = GridFrame::new(cols, rows, corner, frame.step(), frame.ground())?;
-    let lines = heights.chunks(frame.cols()).skip(row).take(rows);
-    Ok((part, lines.flat_map(|line| &line[col..col + cols]).copied().collect()))
+    Ok((part, lines(place).copied().collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ground;
+
+    #[test]
+    fn the_window_finds_the_only_heights_of_a_large_grid() {
+        let (cols, rows) = (3600, 1100);
+        let frame = GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap();
+        for (col, row) in [(1200, 70), (2700, 1099), (0, 0), (3599, 500)] {
+            let mut heights = vec![f64::NAN; cols * rows];
+            heights[frame.index(col, row)] = 7.0;
+            let (part, values) = window(&frame, &heights).unwrap();
+            assert_eq!(values.len(), part.nodes());
+            let found: Vec<_> = values.iter().filter(|z| z.is_finite()).collect();
+            assert_eq!(found, [&7.0], "{col}, {row}");
+        }
+        let (part, _) = window(&frame, &vec![0.0; cols * rows]).unwrap();
+        assert_eq!(part.origin(), DVec2::new(1288.0, -38.0), "the middle");
+    }
 }

@@ -4,12 +4,18 @@
 //! notation). Datum shifts are three- or seven-parameter ones; grid files are not at hand, and where that
 //! matters [`Crs::caveat`] says how much.
 
+mod geo_keys;
+mod wkt;
+
 use std::sync::{Arc, LazyLock};
 
 use glam::DVec2;
 use proj4rs::Proj;
 use proj4rs::adaptors::transform_xy;
 
+pub(crate) use self::geo_keys::GeoKeys;
+pub(super) use self::geo_keys::key;
+use self::wkt::{geographic_code, utm_code, wkt_authority, wkt_ellipsoid, wkt_name, wkt_unit};
 use crate::{Error, Ground, Result};
 
 /// The coordinate reference system of a terrain.
@@ -22,17 +28,6 @@ pub struct Crs {
     projection: Option<Arc<Projection>>,
     caveat: Option<String>,
     keys: Option<Arc<GeoKeys>>,
-}
-
-/// The GeoKey directory of a GeoTIFF and the values it points to (OGC 19-008r4, section 7.1).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GeoKeys {
-    /// Tag 34735: version, revision, minor revision, number of keys; then four numbers a key.
-    pub directory: Vec<u16>,
-    /// Tag 34736.
-    pub doubles: Vec<f64>,
-    /// Tag 34737, without the final NUL.
-    pub ascii: String,
 }
 
 /// A projection and the PROJ.4 text it was made from.
@@ -230,12 +225,16 @@ impl Crs {
         self.caveat.as_deref()
     }
 
-    /// The GeoKeys of the GeoTIFF it was read from, to be written back where there is no EPSG code.
+    /// What a GeoTIFF says of this CRS: the GeoKeys of the file it was read from, else its EPSG code; empty if
+    /// there is neither.
     ///
-    /// The horizontal part only, and always for `PixelIsArea`, whatever the file had.
-    #[must_use]
-    pub fn geo_keys(&self) -> Option<&GeoKeys> {
-        self.keys.as_deref()
+    /// The horizontal part only, as heights are in metres here, and always for `PixelIsArea`.
+    pub(crate) fn geo_keys(&self) -> GeoKeys {
+        match (&self.keys, self.epsg) {
+            (Some(keys), _) => GeoKeys::clone(keys),
+            (None, Some(code)) => GeoKeys::from_epsg(code, self.is_geographic()),
+            (None, None) => GeoKeys::default(),
+        }
     }
 
     /// Longitude (−180 to 180) and latitude in degrees of map coordinates: on WGS84 for the Earth, on its own
@@ -360,282 +359,6 @@ pub(super) fn length_unit(code: u16) -> Option<(&'static str, f64)> {
         9036 => ("kilometre", 1000.0),
         _ => return None,
     })
-}
-
-/// The first quoted text of well-known text: what the CRS is called.
-fn wkt_name(wkt: &str) -> &str {
-    wkt.split('"').nth(1).unwrap_or("")
-}
-
-/// The last `UNIT["name",size` of well-known text, which is the one of the outermost CRS.
-fn wkt_unit(wkt: &str) -> Option<(&str, f64)> {
-    let (_, unit) = wkt.rsplit_once("UNIT[\"")?;
-    let (name, rest) = unit.split_once('"')?;
-    let size = rest.trim_start_matches([',', ' ']).split([',', ']']).next()?;
-    Some((name, size.trim().parse().ok()?))
-}
-
-/// The EPSG code that closes well-known text: `AUTHORITY["EPSG","…"]]`, or in WKT 2 `ID["EPSG",…]]`.
-fn wkt_authority(wkt: &str) -> Option<u32> {
-    let wkt = wkt.trim_end();
-    let (_, authority) = wkt.rsplit_once("\"EPSG\"")?;
-    let digits = authority.trim_start_matches([',', ' ', '"']);
-    let (code, rest) = digits.split_at(digits.find(|c: char| !c.is_ascii_digit())?);
-    // Only the code of the whole: nothing but closing brackets may follow, and just two of them.
-    (rest.trim_start_matches('"').trim() == "]]").then(|| code.parse().ok()).flatten()
-}
-
-/// The `SPHEROID["name",a,1/f` of well-known text in PROJ.4 notation.
-fn wkt_ellipsoid(wkt: &str) -> Option<String> {
-    let (_, spheroid) = wkt.split_once("SPHEROID[").or_else(|| wkt.split_once("ELLIPSOID["))?;
-    let mut numbers = spheroid.split([',', ']']).skip(1).map(|t| t.trim().parse::<f64>().ok());
-    let a = numbers.next()??;
-    let inverse_flattening = numbers.next()??;
-    Some(if inverse_flattening > 1.0 {
-        format!("+a={a} +rf={inverse_flattening}")
-    } else {
-        format!("+R={a}")
-    })
-}
-
-/// EPSG code of a geographic CRS by a name such as `GCS_WGS_1984`.
-fn geographic_code(name: &str) -> Option<u32> {
-    Some(match name {
-        "GCS_WGS_1984" | "WGS 84" => 4326,
-        "GCS_North_American_1983" | "NAD83" => 4269,
-        "GCS_North_American_1927" | "NAD27" => 4267,
-        "GCS_ETRS_1989" | "ETRS89" => 4258,
-        _ => return None,
-    })
-}
-
-/// EPSG code of a UTM zone by a name such as `WGS_1984_UTM_Zone_11N` or `NAD27 / UTM zone 10N`.
-fn utm_code(name: &str) -> Option<u32> {
-    const DATUMS: [(&str, u32); 8] = [
-        ("WGS 84", 32600),
-        ("WGS 1984", 32600),
-        ("NAD83", 26900),
-        ("NAD 1983", 26900),
-        ("NAD27", 26700),
-        ("NAD 1927", 26700),
-        ("ETRS89", 25800),
-        ("ETRS 1989", 25800),
-    ];
-    let name = name.to_ascii_uppercase().replace('_', " ");
-    let (datum, zone) = name.split_once("UTM ZONE ")?;
-    let datum = datum.trim_end_matches([' ', '/']);
-    let (_, base) = DATUMS.iter().find(|(name, _)| *name == datum)?;
-    let (number, hemisphere) =
-        zone.trim_end().split_at_checked(zone.trim_end().len().checked_sub(1)?)?;
-    let number: u32 = number.parse().ok().filter(|n| (1..=60).contains(n))?;
-    match hemisphere {
-        "N" => Some(base + number),
-        "S" if *base == 32600 => Some(32700 + number),
-        _ => None,
-    }
-}
-
-/// Value of a key whose meaning the file spells out itself.
-const USER_DEFINED: u16 = 32767;
-
-/// GeoKey numbers that are used (OGC 19-008r4, annex B).
-pub(super) mod key {
-    pub(crate) const MODEL_TYPE: u16 = 1024;
-    pub(crate) const RASTER_TYPE: u16 = 1025;
-    pub(crate) const CITATION: u16 = 1026;
-    pub(crate) const GEOGRAPHIC_CRS: u16 = 2048;
-    pub(crate) const GEOGRAPHIC_CITATION: u16 = 2049;
-    pub(crate) const GEODETIC_DATUM: u16 = 2050;
-    pub(crate) const ANGULAR_UNITS: u16 = 2054;
-    pub(crate) const ELLIPSOID: u16 = 2056;
-    pub(crate) const SEMI_MAJOR: u16 = 2057;
-    pub(crate) const SEMI_MINOR: u16 = 2058;
-    pub(crate) const INVERSE_FLATTENING: u16 = 2059;
-    pub(crate) const PROJECTED_CRS: u16 = 3072;
-    pub(crate) const PROJECTED_CITATION: u16 = 3073;
-    pub(crate) const METHOD: u16 = 3075;
-    pub(crate) const LINEAR_UNITS: u16 = 3076;
-    pub(crate) const LINEAR_UNIT_SIZE: u16 = 3077;
-    pub(crate) const STD_PARALLEL_1: u16 = 3078;
-    pub(crate) const STD_PARALLEL_2: u16 = 3079;
-    /// Longitude of natural origin, false origin, centre, or straight vertical pole.
-    pub(crate) const ORIGIN_LON: [u16; 4] = [3080, 3084, 3088, 3095];
-    /// Latitude of natural origin, false origin, centre.
-    pub(crate) const ORIGIN_LAT: [u16; 3] = [3081, 3085, 3089];
-    /// False easting at natural origin, false origin, centre.
-    pub(crate) const EASTING: [u16; 3] = [3082, 3086, 3090];
-    /// False northing at natural origin, false origin, centre.
-    pub(crate) const NORTHING: [u16; 3] = [3083, 3087, 3091];
-    /// Scale at natural origin or centre.
-    pub(crate) const SCALE: [u16; 2] = [3092, 3093];
-    pub(crate) const VERTICAL_CRS: u16 = 4096;
-    pub(crate) const VERTICAL_UNITS: u16 = 4099;
-}
-
-impl GeoKeys {
-    /// `(location, count, value or offset)` of a key.
-    fn find(&self, key: u16) -> Option<(u16, usize, u16)> {
-        let (entries, _) = self.directory.get(4..)?.as_chunks::<4>();
-        entries.iter().find(|e| e[0] == key).map(|e| (e[1], e[2].into(), e[3]))
-    }
-
-    /// A key's code.
-    pub(super) fn short(&self, key: u16) -> Option<u16> {
-        self.find(key).filter(|(location, ..)| *location == 0).map(|(.., value)| value)
-    }
-
-    /// A key's EPSG code, if it is one: neither undefined nor user-defined.
-    fn code(&self, key: u16) -> Option<u32> {
-        self.short(key).filter(|code| *code != 0 && *code != USER_DEFINED).map(u32::from)
-    }
-
-    fn double(&self, key: u16) -> Option<f64> {
-        let (location, _, offset) = self.find(key)?;
-        (location == 34736).then(|| self.doubles.get(usize::from(offset)).copied()).flatten()
-    }
-
-    fn text(&self, key: u16) -> Option<&str> {
-        let (location, count, offset) = self.find(key)?;
-        let start = usize::from(offset);
-        let text = (location == 34737).then(|| self.ascii.get(start..start + count)).flatten()?;
-        text.split('|').next().filter(|t| !t.is_empty())
-    }
-
-    /// Without the vertical part, and for `PixelIsArea`.
-    fn horizontal(&self) -> Self {
-        let (entries, _) = self.directory.get(4..).unwrap_or_default().as_chunks::<4>();
-        let entries: Vec<_> = entries
-            .iter()
-            .filter(|e| e[0] < key::VERTICAL_CRS)
-            .map(|e| if e[0] == key::RASTER_TYPE { [key::RASTER_TYPE, 0, 1, 1] } else { *e })
-            .collect();
-        let mut directory = self.directory.get(..3).unwrap_or(&[1, 1, 0]).to_vec();
-        directory.push(entries.len() as u16);
-        directory.extend(entries.iter().flatten());
-        Self { directory, doubles: self.doubles.clone(), ascii: self.ascii.clone() }
-    }
-
-    /// Metres per unit of a projected CRS; metres if nothing is said.
-    fn metres_per_unit(&self) -> Result<f64> {
-        match self.short(key::LINEAR_UNITS) {
-            None => Some(1.0),
-            Some(USER_DEFINED) => self.double(key::LINEAR_UNIT_SIZE).filter(|m| m.is_finite() && *m > 0.0),
-            Some(code) => length_unit(code).map(|(_, metres)| metres),
-        }
-        .ok_or_else(|| {
-            Error::usage(
-                "the unit of the map coordinates is not known, so the size of a cell on the ground is not either; \
-                 reproject with `gdalwarp -t_srs EPSG:...`, or name the right CRS with `gdal_edit.py -a_srs EPSG:...`",
-            )
-        })
-    }
-
-    fn crs_name(&self) -> &str {
-        let citations = [key::PROJECTED_CITATION, key::CITATION, key::GEOGRAPHIC_CITATION];
-        citations.iter().find_map(|k| self.text(*k)).unwrap_or("unnamed")
-    }
-
-    /// A CRS of which only the unit is known, and perhaps a code.
-    fn named_crs(&self) -> Option<Crs> {
-        self.short(key::LINEAR_UNITS)?;
-        let metres = self.metres_per_unit().ok()?;
-        Some(Crs {
-            epsg: self.code(key::PROJECTED_CRS),
-            ..Crs::named(self.crs_name(), &unit_name(metres), metres)
-        })
-    }
-
-    fn user_projected_crs(&self) -> Result<Crs> {
-        let name = self.crs_name();
-        let metres = self.metres_per_unit()?;
-        let plain = Crs::named(name, &unit_name(metres), metres);
-        if name.contains("Pseudo-Mercator") || name.contains("Web_Mercator") {
-            return Crs::from_epsg(3857);
-        }
-        let (Some(conversion), Some((datum, caveat))) = (self.conversion(metres), self.datum())
-        else {
-            return Ok(plain);
-        };
-        let definition = format!("{conversion} {datum} +to_meter={metres} +no_defs");
-        Ok(match Crs::from_proj(&definition, name) {
-            Ok(crs) => Crs { caveat: crs.caveat.or(caveat), ..crs },
-            Err(_) => plain,
-        })
-    }
-
-    fn user_geographic_crs(&self) -> Result<Crs> {
-        let unit = self.short(key::ANGULAR_UNITS).unwrap_or(9102);
-        if !matches!(unit, 9102 | 9122) {
-            return Err(Error::usage(format!(
-                "angles are in EPSG unit {unit}, not degrees; reproject with `gdalwarp -t_srs EPSG:4326`"
-            )));
-        }
-        let Some((datum, caveat)) = self.datum() else {
-            return Err(Error::usage(
-                "a geographic CRS without an ellipsoid; name the right one with `gdal_edit.py -a_srs EPSG:...`",
-            ));
-        };
-        let crs = Crs::from_proj(&format!("+proj=longlat {datum} +no_defs"), self.crs_name())?;
-        Ok(Crs { caveat: crs.caveat.or(caveat), ..crs })
-    }
-
-    /// The ellipsoid and datum shift in PROJ.4 notation, and a caveat if the shift is not known.
-    fn datum(&self) -> Option<(String, Option<String>)> {
-        // EPSG numbers a datum 6000 + n where the geographic CRS on it is 4000 + n, an ellipsoid 7000 + n
-        // where the CRS "on an unknown datum based upon it" is 4000 + n (OGC 19-008r4, annex C).
-        let coded = |key, base: u16| {
-            self.short(key).filter(|c| (base..base + 1000).contains(c)).map(|c| c - base + 4000)
-        };
-        let code = coded(key::GEOGRAPHIC_CRS, 4000).or_else(|| coded(key::GEODETIC_DATUM, 6000));
-        let tokens = |code| {
-            let definition = crs_definitions::from_code(code)?.proj4;
-            let rest = definition.strip_prefix("+proj=longlat ")?;
-            Some(rest.trim_end_matches("+no_defs").trim().to_owned())
-        };
-        if let Some(known) = code.and_then(tokens) {
-            return Some((known, None));
-        }
-        let semi_major = self.double(key::SEMI_MAJOR).filter(|a| a.is_finite() && *a > 0.0);
-        let ellipsoid = match (
-            semi_major,
-            self.double(key::INVERSE_FLATTENING),
-            self.double(key::SEMI_MINOR),
-        ) {
-            (Some(a), Some(rf), _) if rf > 1.0 => format!("+a={a} +rf={rf}"),
-            (Some(a), _, Some(b)) if b > 0.0 && b < a => format!("+a={a} +b={b}"),
-            (Some(a), ..) => format!("+R={a}"),
-            (None, ..) => tokens(coded(key::ELLIPSOID, 7000)?)?,
-        };
-        let on_earth = semi_major.is_none_or(|a| (a - 6_371_000.0).abs() < 20_000.0);
-        let caveat = "the file does not name its datum; longitudes and latitudes may be some hundred metres off";
-        Some((ellipsoid, on_earth.then(|| caveat.to_owned())))
-    }
-
-    /// The map projection in PROJ.4 notation, for the methods that DEMs come in.
-    fn conversion(&self, metres_per_unit: f64) -> Option<String> {
-        let first = |keys: &[u16]| keys.iter().find_map(|k| self.double(*k));
-        let lat_0 = first(&key::ORIGIN_LAT).unwrap_or(0.0);
-        let lon_0 = first(&key::ORIGIN_LON).unwrap_or(0.0);
-        let parallel_1 = self.double(key::STD_PARALLEL_1);
-        let parallel_2 = self.double(key::STD_PARALLEL_2).or(parallel_1);
-        let true_scale = parallel_1.map(|lat| format!(" +lat_ts={lat}")).unwrap_or_default();
-        let method = match self.short(key::METHOD)? {
-            1 => format!("+proj=tmerc +lat_0={lat_0}"),
-            7 => format!("+proj=merc{true_scale}"),
-            8 => format!("+proj=lcc +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
-            9 => format!("+proj=lcc +lat_1={lat_0} +lat_0={lat_0}"),
-            10 => format!("+proj=laea +lat_0={lat_0}"),
-            11 => format!("+proj=aea +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
-            15 => format!("+proj=stere +lat_0={} +lat_ts={lat_0}", 90f64.copysign(lat_0)),
-            17 => format!("+proj=eqc{true_scale} +lat_0={lat_0}"),
-            24 => "+proj=sinu".to_owned(),
-            _ => return None,
-        };
-        let scale = first(&key::SCALE).unwrap_or(1.0);
-        let [x_0, y_0] =
-            [key::EASTING, key::NORTHING].map(|k| first(&k).unwrap_or(0.0) * metres_per_unit);
-        Some(format!("{method} +lon_0={lon_0} +k={scale} +x_0={x_0} +y_0={y_0}"))
-    }
 }
 
 #[cfg(test)]
@@ -774,14 +497,33 @@ mod tests {
             [3082, 34736, 1, 2],
             [4099, 0, 1, 9002],
         ];
-        let keys = GeoKeys { directory: directory.concat(), doubles, ascii: String::new() };
+        let keys = GeoKeys { directory: directory.concat(), doubles, ascii: Vec::new() };
         let crs = Crs::from_geo_keys(keys).unwrap();
         let utm = Crs::from_epsg(32631).unwrap();
         let at = DVec2::new(400_000.0, 4_700_000.0);
         assert_near(crs.to_lonlat(at / 0.3048).unwrap(), utm.to_lonlat(at).unwrap(), 1e-9);
-        let kept = crs.geo_keys().unwrap();
+        let kept = crs.geo_keys();
         assert_eq!(kept.short(key::RASTER_TYPE), Some(1));
         assert_eq!(kept.short(key::VERTICAL_UNITS), None);
         assert_eq!(kept.directory.len(), 4 * (1 + usize::from(kept.directory[3])));
+    }
+
+    #[test]
+    fn geo_keys_come_from_the_file_or_the_code() {
+        let utm = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32631];
+        assert_eq!(Crs::from_epsg(32631).unwrap().geo_keys().directory, utm);
+        assert_eq!(Crs::from_epsg(4326).unwrap().geo_keys().directory[12..], [2048, 0, 1, 4326]);
+        assert_eq!(Crs::none().geo_keys(), GeoKeys::default());
+        // Points, with feet for the heights, a key twice and out of order.
+        let directory = [
+            [1, 1, 0, 5],
+            [1025, 0, 1, 2],
+            [1024, 0, 1, 1],
+            [3072, 0, 1, 32631],
+            [3072, 0, 1, 32632],
+            [4099, 0, 1, 9002],
+        ];
+        let keys = GeoKeys { directory: directory.concat(), ..GeoKeys::default() };
+        assert_eq!(Crs::from_geo_keys(keys).unwrap().geo_keys().directory, utm);
     }
 }

@@ -142,7 +142,7 @@ fn geo_keys(image: &Directory) -> Outcome<GeoKeys> {
     Ok(GeoKeys {
         directory: directory.into_iter().map(|v| v as u16).collect(),
         doubles: image.doubles(tag::GEO_DOUBLE_PARAMS)?,
-        ascii: image.text(tag::GEO_ASCII_PARAMS)?.unwrap_or_default().into_owned(),
+        ascii: image.text_bytes(tag::GEO_ASCII_PARAMS)?.unwrap_or_default().to_vec(),
     })
 }
 

@@ -18,7 +18,8 @@ use glam::DVec2;
 
 pub mod synthetic;
 
-pub use self::crs::{Crs, GeoKeys};
+pub use self::crs::Crs;
+pub(crate) use self::crs::GeoKeys;
 use crate::{Error, GridFrame, Result};
 
 /// Heights at the nodes of a grid, in metres; `NaN` marks a void.

@@ -240,12 +240,17 @@ impl<'a> Directory<'a> {
         }
     }
 
-    /// The text of a tag without the final NUL; `None` if the image does not have it.
-    pub(super) fn text(&self, tag: u16) -> Outcome<Option<Cow<'a, str>>> {
+    /// The bytes of a text without the final NUL; `None` if the image does not have it.
+    pub(super) fn text_bytes(&self, tag: u16) -> Outcome<Option<&'a [u8]>> {
         Ok(self.values(tag)?.map(|(_, bytes)| {
             let end = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
-            String::from_utf8_lossy(&bytes[..end])
+            &bytes[..end]
         }))
+    }
+
+    /// The text of a tag; `None` if the image does not have it.
+    pub(super) fn text(&self, tag: u16) -> Outcome<Option<Cow<'a, str>>> {
+        Ok(self.text_bytes(tag)?.map(String::from_utf8_lossy))
     }
 }
 
