@@ -69,14 +69,8 @@ impl StartRegion {
                 }
             });
         }
-        if !self.areas.is_empty() {
-            for row in 0..field.rows() {
-                for col in 0..field.cols() {
-                    if self.covers(DVec2::new(col as f64, row as f64)) && field.is_open(col, row) {
-                        set(col, row, 0.0);
-                    }
-                }
-            }
+        for rings in &self.areas {
+            inside(field, rings, |col, row| set(col, row, 0.0));
         }
     }
 
@@ -131,6 +125,30 @@ fn near(
             let (_, theta) = segment(0.0, a - node, 0.0, b - node, Sym2::new(1.0, 0.0, 1.0));
             if a.lerp(b, theta).distance(node) <= radius && field.is_open(col, row) {
                 visit(col, row, node);
+            }
+        }
+    }
+}
+
+/// Open nodes inside the rings by the even-odd rule, row by row between the crossings of their segments.
+fn inside(field: &TensorField, rings: &[Vec<DVec2>], mut visit: impl FnMut(usize, usize)) {
+    for row in 0..field.rows() {
+        let y = row as f64;
+        let segments = rings.iter().flat_map(|ring| closed_segments(ring));
+        let mut crossings: Vec<f64> = segments
+            .filter(|(a, b)| (a.y > y) != (b.y > y))
+            .map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
+            .filter(|x| x.is_finite())
+            .collect();
+        crossings.sort_unstable_by(f64::total_cmp);
+        for ends in crossings.chunks_exact(2) {
+            let last = ends[1].min((field.cols() - 1) as f64);
+            let mut col = ends[0].ceil().max(0.0);
+            while col <= last {
+                if field.is_open(col as usize, row) {
+                    visit(col as usize, row);
+                }
+                col += 1.0;
             }
         }
     }

@@ -191,6 +191,23 @@ fn goals_end_the_solve_early_with_final_values() {
 }
 
 #[test]
+fn the_default_tolerance_moves_no_value_noticeably() {
+    for ratio in [1.0, 20.0, 100.0] {
+        let tensor = |c: usize, r: usize| {
+            let (x, y) = (c as f64 * 0.05, r as f64 * 0.04);
+            Some(
+                rotated(1.0 + (ratio - 1.0) * (x.sin() * y.cos()).powi(2), x + y)
+                    * (2.0 + (x * y).sin()),
+            )
+        };
+        let (loose, exact) =
+            [solve, exactly].map(|run| run(field(300, 260, tensor), DVec2::splat(130.0))).into();
+        let (largest, _) = errors(&loose, |c, r| Some(exact.at_node(c, r)));
+        assert!(largest < 3e-5, "ratio {ratio}: {largest}");
+    }
+}
+
+#[test]
 fn thread_count_changes_no_bit() {
     let tensor = |c: usize, r: usize| {
         let void = (c / 9 + r / 7).is_multiple_of(5) && c % 9 < 6;
