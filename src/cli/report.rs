@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(digits(123_456.7), "123457");
         assert_eq!(digits(1.5e-9), "1.500e-9");
         assert_eq!(digits(f64::NAN), "NaN");
-        assert_eq!(coordinate(500_000.1234, 30.0), "500000.1");
+        assert_eq!(coordinate(500_000.123_4, 30.0), "500000.1");
         assert_eq!(coordinate(1.0 / 1200.0, 1e-5 / 1200.0), "0.00083333333");
         assert_eq!(coordinate(1.999_583_333, 1.0 / 1200.0), "1.999583");
         assert_eq!(metres(12_344.0), "12.34 km");
