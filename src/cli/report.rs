@@ -106,9 +106,12 @@ impl std::fmt::Display for Facts {
     }
 }
 
-/// A length with its unit: `823 m`, `12.34 km`.
+/// A length with its unit: `823 m`, `12.34 km`; under a hundredth of a millimetre, which only
+/// rounding makes, `0 m`.
 pub(crate) fn metres(value: f64) -> String {
-    if value.abs() >= 10_000.0 {
+    if value.abs() < 1e-5 {
+        "0 m".into()
+    } else if value.abs() >= 10_000.0 {
         format!("{:.2} km", value / 1000.0)
     } else if value.abs() >= 100.0 {
         format!("{value:.0} m")
@@ -163,6 +166,8 @@ mod tests {
         assert_eq!(coordinate(1.999_583_333, 1.0 / 1200.0), "1.999583");
         assert_eq!(metres(12_344.0), "12.34 km");
         assert_eq!(metres(823.4), "823 m");
+        assert_eq!(metres(0.007_108), "0.007108 m");
+        assert_eq!(metres(-2.7e-13), "0 m");
         assert_eq!(distance(823.4, "AG units"), "823.4 AG units");
     }
 
