@@ -434,7 +434,7 @@ fn no_way_is_an_answer_of_its_own() {
     folder.bad(
         "route split.asc --start pixel:0,1 --goal pixel:4,1",
         1,
-        "--goal pixel:4,1 cannot be reached from the start: voids or barriers lie between; \
+        "--goal pixel:4,1 cannot be reached from the start: voids, barriers or too steep ground lie between; \
          the nearest good place is pixel:1,1",
     );
     for command in ["route", "compare"] {
@@ -443,7 +443,7 @@ fn no_way_is_an_answer_of_its_own() {
                 "{command} range.tif --start pixel:3,3 --goal pixel:50,4 --barrier wall.geojson"
             ),
             1,
-            "--goal pixel:50,4 cannot be reached from the start: voids or barriers lie between; \
+            "--goal pixel:50,4 cannot be reached from the start: voids, barriers or too steep ground lie between; \
              the nearest good place is pixel:25,4",
         );
     }

@@ -116,7 +116,7 @@ impl<'a> Journey<'a> {
         for goal in &self.goals {
             if distance.at(goal.at).is_none() {
                 let reached = |col, row| distance.at_node(col, row).is_finite();
-                let why = "cannot be reached from the start: voids or barriers lie between";
+                let why = "cannot be reached from the start: voids, barriers or too steep ground lie between";
                 return Err(Error::NoWay(goal.refusal(&self.terrain, reached, why)?));
             }
         }

@@ -36,7 +36,7 @@ pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> R
     let grid = descent::line(distance, goal).ok_or_else(|| {
         let at = metric.surface().frame().to_map(goal);
         Error::NoWay(format!(
-            "there is no way from the start to the goal at {}, {}: voids or barriers lie between",
+            "there is no way from the start to the goal at {}, {}: voids, barriers or too steep ground lie between",
             at.x, at.y
         ))
     })?;

@@ -65,6 +65,9 @@ impl Default for Source {
     }
 }
 
+/// No body of the solar system has ground this many metres from its datum.
+const HIGHEST: f64 = 1e5;
+
 impl Terrain {
     /// Heights in metres, row by row from the north; `NaN` or infinite cells become voids.
     ///
@@ -98,8 +101,12 @@ impl Terrain {
             heights.iter_mut().for_each(|h| *h *= metres);
         }
         let mut terrain = Self::new(frame, heights, raster.crs)?;
-        if terrain.statistics().1.is_none() {
-            raster.notes.push("every cell is void: there is no terrain to work on".to_owned());
+        match terrain.statistics().1 {
+            None => raster.notes.push("every cell is void: there is no terrain to work on".to_owned()),
+            Some([lowest, highest, _]) if highest.max(-lowest) > HIGHEST => raster.notes.push(format!(
+                "heights run from {lowest:e} to {highest:e} m, which no terrain does; is a nodata value not declared?"
+            )),
+            Some(_) => {}
         }
         raster.notes.extend(terrain.crs.caveat().map(str::to_owned));
         terrain.notes = raster.notes;

@@ -49,6 +49,7 @@ fn text(args: &InfoArgs, terrain: &Terrain) -> String {
         "voids",
         match voids {
             0 => "none".into(),
+            1 => format!("1 cell ({share:.1} %)"),
             _ => format!("{voids} cells ({share:.1} %)"),
         },
     );
