@@ -89,8 +89,8 @@ pub enum Metric {
 /// What composes with every metric.
 #[derive(Clone, Debug, Default)]
 pub struct Modifiers {
-    /// `β ≥ 0`: adds `β ∇z ∇zᵀ` to the metric `M`, an aversion to grade: a metre of rise over a plan metre
-    /// costs as much as `√β` flat units more. Default 0.
+    /// `β ≥ 0`: adds `β ∇z ∇zᵀ` to the metric `M`, an aversion to grade. On the isotropic metric a grade `s` then costs
+    /// `√(1 + s² + β s²)` per plan metre. Default 0.
     pub climb_weight: f64,
     /// Steepest ground that may be entered, degrees. Default: any.
     pub max_slope_deg: Option<f64>,
