@@ -339,7 +339,7 @@ fn bad_input_is_named() {
     folder.bad(
         "route plain.tif --start huts.geojson --goal pixel:3,4",
         2,
-        "huts.geojson: the terrain's CRS is none, from which there is no way to longitude and latitude; \
+        "huts.geojson: the terrain has no CRS, so there is no way to longitude and latitude; \
          give places in map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
     );
 }
@@ -418,7 +418,7 @@ fn places_off_the_ground_are_explained() {
     folder.bad(
         "route plain.tif --start lonlat:1,2 --goal pixel:4,1",
         2,
-        "the terrain's CRS is none, from which there is no way to longitude and latitude; give places in \
+        "the terrain has no CRS, so there is no way to longitude and latitude; give places in \
          map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
     );
     folder.bad(

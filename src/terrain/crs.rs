@@ -281,9 +281,13 @@ impl Crs {
         match &self.projection {
             Some(projection) => Ok(&projection.proj),
             None => Err(Error::usage(format!(
-                "the terrain's CRS is {}, from which there is no way to longitude and latitude; \
+                "the terrain {}, so there is no way to longitude and latitude; \
                  give places in map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
-                self.name()
+                if self.is_none() {
+                    "has no CRS".to_owned()
+                } else {
+                    format!("is in {}, which cannot be projected", self.name())
+                }
             ))),
         }
     }
@@ -393,7 +397,7 @@ mod tests {
         assert!(Crs::from_epsg(4_000_000).is_err());
         // NTF (Paris), in grads.
         assert!(Crs::from_epsg(4807).unwrap_err().to_string().contains("grad"));
-        assert!(Crs::none().to_lonlat(DVec2::ZERO).unwrap_err().to_string().contains("none"));
+        assert!(Crs::none().to_lonlat(DVec2::ZERO).unwrap_err().to_string().contains("no CRS"));
     }
 
     #[test]
