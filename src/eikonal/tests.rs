@@ -300,7 +300,11 @@ proptest! {
         let control = Control::default();
         if let Ok(whole) = solver.solve_field(f.clone(), &start, &[], &control) {
             let part = solver.solve_field(f, &start, &[goal], &control).unwrap();
-            prop_assert_eq!(part.at(goal), whole.at(goal));
+            match (part.at(goal), whole.at(goal)) {
+                // Some units in the last place of the `f32` of a node.
+                (Some(a), Some(b)) => prop_assert!((a - b).abs() <= 1e-6 * b, "{a} {b}"),
+                (a, b) => prop_assert_eq!(a, b),
+            }
         }
     }
 
