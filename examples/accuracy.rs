@@ -16,6 +16,7 @@ const RESOLUTIONS: [usize; 4] = [101, 201, 401, 801];
 
 fn main() -> Result<(), Error> {
     directions()?;
+    farthest_off()?;
     println!(
         "\nMean error of the distance, relative to the mean distance; the order from each pair"
     );
@@ -83,6 +84,28 @@ fn directions() -> Result<(), Error> {
         .map(|g| (g / radius - 1.0).abs())
         .fold(0.0, f64::max);
     println!("Flat plane, worst direction at 200 cells: {:.3} %", 100.0 * worst);
+    Ok(())
+}
+
+/// The largest relative error more than 200 cells from the source on 1001² nodes, by ratio of the tensor.
+fn farthest_off() -> Result<(), Error> {
+    let n = 1001;
+    let plane = surface(n, |_| 0.0)?;
+    let frame = plane.frame();
+    for ratio in [1.0, 4.0, 25.0, 100.0] {
+        let along = DVec2::from_angle(0.5);
+        let tensor = Sym2::outer(along) * ratio + Sym2::outer(along.perp());
+        let metric = Metric::Tensor(vec![tensor; n * n].into());
+        let map = solve(&metric.on(&plane, &Modifiers::default())?, DVec2::ZERO)?;
+        let relative = |i: usize| {
+            let at = frame.to_map(DVec2::new((i % n) as f64, (i / n) as f64));
+            let exact = tensor.inverse().norm(at);
+            let far = at.length() > 0.2;
+            if far { (map.at_node(i % n, i / n) / exact - 1.0).abs() } else { 0.0 }
+        };
+        let worst = (0..n * n).map(relative).fold(0.0, f64::max);
+        println!("Ratio {ratio}, largest error beyond 200 cells: {:.2} %", 100.0 * worst);
+    }
     Ok(())
 }
 

@@ -3,8 +3,8 @@
 use glam::DVec2;
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
-    Control, Crs, DistanceMap, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers,
-    Route, Solver, Terrain, route::trace,
+    Comparison, Control, Crs, DistanceMap, FitOptions, GridFrame, Ground, HeightSurface, Metric,
+    Modifiers, Route, Solver, Terrain, route::trace,
 };
 
 /// A rough terrain of `n × n` nodes.
@@ -195,5 +195,19 @@ fn routes_begin_and_end_where_they_were_asked_to_and_know_their_length() {
         assert!(route.summary.plan_length_m < route.summary.length_m);
         let rise = route.points[route.points.len() - 1].z - route.points[0].z;
         assert!((route.summary.climb_m - route.summary.descent_m - rise).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_goal_on_the_start_costs_nothing_and_every_route_there_is_best() {
+    let terrain = square(N, heights(N));
+    let control = Control::default();
+    let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
+    let fields = metrics().map(|metric| metric.on(&surface, &Modifiers::default()).unwrap());
+    let comparison = Comparison::between(&fields, &GOAL.into(), GOAL, &control).unwrap();
+    for (m, costs) in comparison.costs.iter().enumerate() {
+        for (r, &cost) in costs.iter().enumerate() {
+            assert_eq!((cost, comparison.ratio(m, r)), (0.0, 1.0));
+        }
     }
 }

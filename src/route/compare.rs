@@ -43,10 +43,12 @@ impl Comparison {
         Ok(Self { routes, distances, costs })
     }
 
-    /// Cost of route `route` under metric `metric`, divided by the least cost of any of the routes under it.
+    /// Cost of route `route` under metric `metric`, divided by the least cost of any of the routes under it; 1 for
+    /// the best, also where the goal is on the start and all costs are 0.
     #[must_use]
     pub fn ratio(&self, metric: usize, route: usize) -> f64 {
         let costs = &self.costs[metric];
-        costs[route] / costs.iter().copied().fold(f64::INFINITY, f64::min)
+        let best = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        if costs[route] == best { 1.0 } else { costs[route] / best }
     }
 }
