@@ -74,11 +74,11 @@ pub(crate) fn write_raster(
     path: &Path,
     overwrite: bool,
     terrain: &Terrain,
-    bands: &[(String, Vec<f32>)],
+    bands: &[(String, Samples<'_>)],
 ) -> Result<()> {
     let bands: Vec<_> = bands
         .iter()
-        .map(|(description, values)| Band { description, samples: Samples::F32(values) })
+        .map(|(description, samples)| Band { description, samples: *samples })
         .collect();
     write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), terrain.crs(), &bands))
 }

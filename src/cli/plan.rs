@@ -127,7 +127,7 @@ impl<'a> Journey<'a> {
     pub(crate) fn barriers(&self, field: &MetricField<'_>) -> Vec<bool> {
         let frame = self.terrain.frame();
         let nodes = (0..frame.rows()).flat_map(|row| (0..frame.cols()).map(move |col| (col, row)));
-        nodes.map(|(c, r)| !field.is_open(c, r) && !self.terrain.is_void(c, r)).collect()
+        nodes.map(|(c, r)| !field.is_open(c, r) && !self.surface.is_void(c, r)).collect()
     }
 
     /// For [`Error::NoWay`], which metrics' distances end before the goal and where; else the error.

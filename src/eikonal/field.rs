@@ -1,13 +1,17 @@
 //! Speed tensors on the nodes, in the solver's own units, tile by tile.
 
 use glam::DVec2;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
-use crate::{Control, GridFrame, HeightJet, MetricField, Result, Sym2};
+use crate::metric::SpeedBlock;
+use crate::surface::BLOCK;
+use crate::{Control, MetricField, Result, Sym2};
 
 /// Side of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
 /// needs more activations, the longer more sweeps; design measurements at ratio 1 to 400).
 pub(crate) const SIDE: usize = 16;
+const _: () = assert!(SIDE == BLOCK, "a tile is filled from one block of speeds");
 /// Nodes of a tile.
 pub(crate) const AREA: usize = SIDE * SIDE;
 
@@ -21,16 +25,6 @@ pub(crate) struct TensorTile {
 
 impl TensorTile {
     const CLOSED: Self = Self { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
-
-    /// The longest of the steps (1,0), (0,1), (1,1), (1,−1) from any open node: the squares of the last two are
-    /// `(xx + yy ∓ 2xy)/det`, at most `(xx + yy + 2|xy|)/det`.
-    fn longest_step(&self) -> f32 {
-        let squared = |i: usize| {
-            let (xx, xy, det) = (self.xx[i], self.xy[i], self.det[i]);
-            if det > 0.0 { (xx + (det + xy * xy) / xx + 2.0 * xy.abs()) / det } else { 0.0 }
-        };
-        (0..AREA).map(squared).fold(0.0, f32::max).sqrt()
-    }
 }
 
 /// How the nodes of a grid are cut into tiles.
@@ -78,20 +72,12 @@ impl TensorField {
     /// Cancelled.
     pub fn sample(metric: &MetricField<'_>, control: &Control) -> Result<Self> {
         let frame = metric.surface().frame();
-        let sample_rows = |rows: std::ops::Range<usize>,
-                           visit: &mut dyn FnMut(usize, usize, Sym2)| {
-            let mut jets = vec![HeightJet::default(); frame.cols()];
-            let mut speeds = vec![Sym2::default(); frame.cols()];
-            for row in rows {
-                metric.row_speeds(row, &mut jets, &mut speeds);
-                for (col, speed) in speeds.iter().enumerate() {
-                    if metric.is_open(col, row) {
-                        visit(col, row, to_index(frame, row, *speed));
-                    }
-                }
-            }
-        };
-        Self::build(frame.cols(), frame.rows(), sample_rows, control)
+        // Columns run east, rows run south, one node per step.
+        let stretch: Vec<_> = (0..frame.rows())
+            .map(|row| frame.spacing(row as f64).recip() * DVec2::new(1.0, -1.0))
+            .collect();
+        let sample = |col, row, speeds: &mut SpeedBlock| metric.block_speeds(col, row, speeds);
+        Self::build(frame.cols(), frame.rows(), &stretch, sample, control)
     }
 
     /// The field of a function of `(column, row)` in index coordinates; `None` for a closed node.
@@ -104,48 +90,51 @@ impl TensorField {
         tensor: impl Fn(usize, usize) -> Option<Sym2> + Sync,
         control: &Control,
     ) -> Result<Self> {
-        let sample_rows = |range: std::ops::Range<usize>,
-                           visit: &mut dyn FnMut(usize, usize, Sym2)| {
-            for row in range {
-                for col in 0..cols {
-                    if let Some(d) = tensor(col, row) {
-                        visit(col, row, d);
+        let sample = |col: usize, row: usize, speeds: &mut SpeedBlock| {
+            speeds.det = Default::default();
+            for j in 0..SIDE.min(rows - row) {
+                for i in 0..SIDE.min(cols - col) {
+                    if let Some(d) = tensor(col + i, row + j) {
+                        speeds.set(j, i, (d, d.det()));
                     }
                 }
             }
         };
-        Self::build(cols, rows, sample_rows, control)
+        Self::build(cols, rows, &vec![DVec2::ONE; rows], sample, control)
     }
 
+    /// The field of the tensors that `sample` gives for the block whose first node is `(col, row)`, once the
+    /// coordinates are stretched by `stretch`, one for each row.
     fn build(
         cols: usize,
         rows: usize,
-        sample_rows: impl Fn(std::ops::Range<usize>, &mut dyn FnMut(usize, usize, Sym2)) + Sync,
+        stretch: &[DVec2],
+        sample: impl Fn(usize, usize, &mut SpeedBlock) + Sync,
         control: &Control,
     ) -> Result<Self> {
         let tiling = Tiling::new(cols, rows);
-        let root_scale = typical_speed(rows, &sample_rows);
-        let shrink = (root_scale * root_scale).recip();
-        let mut tiles = vec![TensorTile::CLOSED; tiling.tiles()];
-        let sums: Vec<(f64, usize)> = tiles
-            .par_chunks_mut(tiling.across)
-            .enumerate()
-            .map(|(band, tiles)| {
-                control.check()?;
-                let first = band * SIDE;
-                let mut sum = (0.0, 0);
-                sample_rows(first..(first + SIDE).min(rows), &mut |col, row, d| {
-                    let d = d * shrink;
-                    if store(&mut tiles[col / SIDE], (row % SIDE) * SIDE + col % SIDE, d) {
-                        sum = (sum.0 + d.det().powf(-0.25), sum.1 + 1);
-                    }
-                });
-                Ok(sum)
+        let root_scale = typical_speed(tiling, stretch, &sample);
+        let (mut tiles, mut steps) = (Vec::new(), Vec::new());
+        (0..tiling.tiles())
+            .into_par_iter()
+            .with_min_len(tiling.across)
+            .map_init(SpeedBlock::default, |speeds, i| {
+                let mut tile = TensorTile::CLOSED;
+                if control.cancel.is_cancelled() {
+                    return (tile, Steps::default());
+                }
+                let (col, row) = ((i % tiling.across) * SIDE, (i / tiling.across) * SIDE);
+                sample(col, row, speeds);
+                let steps = store(speeds, &stretch[row..], root_scale.recip(), &mut tile);
+                (tile, steps)
             })
-            .collect::<Result<_>>()?;
-        let (sum, count) = sums.iter().fold((0.0, 0), |(s, n), (ds, dn)| (s + ds, n + dn));
+            .unzip_into_vecs(&mut tiles, &mut steps);
+        control.check()?;
+        let (sum, count) = steps.iter().fold((0.0, 0), |(sum, count), steps| {
+            (sum + f64::from(steps.sum), count + steps.count as usize)
+        });
         let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
-        let longest_step = tiles.par_iter().map(TensorTile::longest_step).collect();
+        let longest_step = steps.iter().map(|steps| steps.longest).collect();
         Ok(Self { tiling, tiles, root_scale, longest_step, mean_step: mean_step as f32 })
     }
 
@@ -210,39 +199,147 @@ impl TensorField {
     }
 }
 
-/// `D` in index coordinates: columns run east, rows run south, one node per step.
-fn to_index(frame: &GridFrame, row: usize, speed: Sym2) -> Sym2 {
-    let h = frame.spacing(row as f64);
-    speed.stretched(DVec2::new(h.x.recip(), -h.y.recip()))
+/// What is known of the steps in a tile, in stored units.
+#[derive(Clone, Copy, Debug, Default)]
+struct Steps {
+    /// The longest to a neighbour from an open node.
+    longest: f32,
+    /// Sum of the lengths of the open cells, and their number.
+    sum: f32,
+    count: u32,
 }
 
-/// A power of two near the typical speed `det(D)^(1/4)`, from a few dozen rows.
+/// A power of two near the typical speed `det(D)^(1/4)`, from tiles spread over the grid.
 fn typical_speed(
-    rows: usize,
-    sample_rows: &(impl Fn(std::ops::Range<usize>, &mut dyn FnMut(usize, usize, Sym2)) + Sync),
+    tiling: Tiling,
+    stretch: &[DVec2],
+    sample: impl Fn(usize, usize, &mut SpeedBlock),
 ) -> f64 {
-    const SAMPLED_ROWS: usize = 32;
-    let mut sum = 0.0;
-    let mut count = 0.0;
-    for row in (0..rows).step_by(rows.div_ceil(SAMPLED_ROWS).max(1)) {
-        sample_rows(row..row + 1, &mut |_, _, d| {
-            if d.is_positive_definite() {
-                sum += d.det().log2();
-                count += 1.0;
+    const SPREAD: usize = 16;
+    let mut speeds = SpeedBlock::default();
+    let (mut sum, mut count) = (0, 0);
+    for down in (0..tiling.down).step_by(tiling.down.div_ceil(SPREAD).max(1)) {
+        for across in (0..tiling.across).step_by(tiling.across.div_ceil(SPREAD).max(1)) {
+            sample(across * SIDE, down * SIDE, &mut speeds);
+            for (by, det) in stretch[down * SIDE..].iter().zip(&speeds.det) {
+                let squared = (by.x * by.y).powi(2);
+                for det in det.iter().map(|det| det * squared).filter(|det| det.is_normal()) {
+                    // The binary exponent: the logarithm rounded down.
+                    sum += i64::from((det.to_bits() >> 52) as u32 & 0x7ff) - 1023;
+                    count += 1;
+                }
             }
-        });
+        }
     }
-    if count > 0.0 { (0.25 * sum / count).round().exp2() } else { 1.0 }
+    let mean = if count > 0 { sum as f64 / f64::from(count) + 0.5 } else { 0.0 };
+    (0.25 * mean).round().exp2()
 }
 
-/// Stores a tensor unless it is out of the range of `f32`; then the node stays closed.
-fn store(tile: &mut TensorTile, place: usize, d: Sym2) -> bool {
-    const RANGE: std::ops::Range<f64> = 1e-15..1e15;
-    let fits = RANGE.contains(&d.xx) && RANGE.contains(&d.yy) && RANGE.contains(&d.det());
-    if fits {
-        tile.xx[place] = d.xx as f32;
-        tile.xy[place] = d.xy as f32;
-        tile.det[place] = d.det() as f32;
+/// Stores the tensors of a block in coordinates stretched by `stretch` of each row and `shrink`. A tensor out of the range
+/// of `f32` closes its node.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorTile) -> Steps {
+    let mut longest = [0f32; SIDE];
+    let mut sums = [0f32; SIDE];
+    let mut counts = [0u32; SIDE];
+    for (row, by) in stretch.iter().take(SIDE).enumerate() {
+        let (x, y) = (by.x * shrink, by.y * shrink);
+        let (fxx, fxy, fyy, fdet) = (x * x, x * y, y * y, (x * y) * (x * y));
+        for i in 0..SIDE {
+            let (xx, xy) = (speeds.xx[row][i] * fxx, speeds.xy[row][i] * fxy);
+            let (yy, det) = (speeds.yy[row][i] * fyy, speeds.det[row][i] * fdet);
+            let fits = fits(xx) & fits(yy) & fits(det);
+            let place = row * SIDE + i;
+            tile.xx[place] = if fits { xx as f32 } else { 0.0 };
+            tile.xy[place] = if fits { xy as f32 } else { 0.0 };
+            tile.det[place] = if fits { det as f32 } else { 0.0 };
+            // The squares of the steps (1,1) and (1,−1) are (xx + yy ∓ 2xy)/det; those of (1,0) and (0,1) are less
+            // than the larger of them.
+            let det = det as f32;
+            let squared = (xx + yy + 2.0 * xy.abs()) as f32 / det;
+            let squared = if fits { squared } else { 0.0 };
+            longest[i] = if squared > longest[i] { squared } else { longest[i] };
+            // A cell is as long as 1/√speed: det^(−1/4).
+            sums[i] += if fits { (1.0 / det).sqrt().sqrt() } else { 0.0 };
+            counts[i] += u32::from(fits);
+        }
     }
-    fits
+    Steps {
+        longest: longest.into_iter().fold(0.0, f32::max).sqrt(),
+        sum: sums.iter().sum(),
+        count: counts.iter().sum(),
+    }
+}
+
+/// Whether a number, and the numbers it is multiplied with, keep within the range of `f32`.
+#[inline(always)]
+fn fits(value: f64) -> bool {
+    (value >= 1e-15) & (value < 1e15)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
+    use crate::{Crs, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers, Terrain};
+
+    /// The stored tensors of a metric against those at single points; the largest relative difference.
+    fn difference(metric: &MetricField<'_>) -> f64 {
+        let frame = metric.surface().frame();
+        let field = TensorField::sample(metric, &Control::default()).unwrap();
+        let mut largest = 0.0_f64;
+        for (col, row) in (0..frame.nodes()).map(|i| (i % frame.cols(), i / frame.cols())) {
+            assert_eq!(field.is_open(col, row), metric.is_open(col, row));
+            if metric.is_open(col, row) {
+                let by = frame.spacing(row as f64) * DVec2::new(1.0, -1.0) * field.root_scale();
+                let d = metric.speed(DVec2::new(col as f64, row as f64)).stretched(by.recip());
+                let (tile, i) = field.tiling.place(col, row);
+                let tile = &field.tiles[tile];
+                let [xx, xy, det] = [tile.xx[i], tile.xy[i], tile.det[i]].map(f64::from);
+                largest = largest
+                    .max((xx - d.xx).abs() / d.xx)
+                    .max((xy - d.xy).abs() / (d.xx * d.yy).sqrt())
+                    .max((det - d.det()).abs() / d.det());
+            }
+        }
+        largest
+    }
+
+    #[test]
+    fn stored_tensors_are_those_of_the_metric() {
+        let tensor = |i: usize| Sym2::new(2.0 + (i as f64).sin(), 0.5, 1.0);
+        for kind in [SyntheticKind::Fractal, SyntheticKind::Sphere, SyntheticKind::Plane] {
+            let synthetic = Synthetic::new(kind, 53, 37, 30.0).unwrap();
+            let plane = synthetic.terrain(Crs::none(), DVec2::ZERO).unwrap();
+            let mut heights = plane.heights().to_vec();
+            heights[700] = f64::NAN;
+            let place = (DVec2::new(8.0, 71.0), DVec2::splat(1.0 / 3600.0));
+            let globe = GridFrame::new(53, 37, place.0, place.1, Ground::WGS84).unwrap();
+            for frame in [plane.frame().clone(), globe] {
+                let terrain = Terrain::new(frame, heights.clone(), Crs::none()).unwrap();
+                let surface =
+                    HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default())
+                        .unwrap();
+                let tensors: Arc<[Sym2]> = (0..53 * 37).map(tensor).collect();
+                for metric in [
+                    Metric::Isotropic,
+                    Metric::Curvature(Default::default()),
+                    Metric::Tensor(tensors),
+                ] {
+                    for climb_weight in [0.0, 30.0] {
+                        let modifiers = Modifiers { climb_weight, ..Modifiers::default() };
+                        let metric = metric.on(&surface, &modifiers).unwrap();
+                        let difference = difference(&metric);
+                        assert!(difference < 1e-6, "{kind:?} {} {difference:e}", metric.name());
+                    }
+                }
+            }
+        }
+    }
 }

@@ -3,7 +3,9 @@
 //! The `tiff` crate writes header and directory; it has no tiles and no floating-point predictor, so
 //! the tiles are made here. BigTIFF is used where the classic format's 4 GB could be exceeded.
 
+use std::fmt;
 use std::io::{self, Seek, Write};
+use std::ops::Range;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
@@ -38,47 +40,85 @@ pub struct Band<'a> {
 }
 
 /// The values of a band.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum Samples<'a> {
     /// Measures; `NaN` is nodata. Infinite values are written as `NaN`.
     F32(&'a [f32]),
+    /// The same, made when they are written, so that they never lie in memory all at once: given the number of a row,
+    /// fills its values.
+    F32Rows(&'a (dyn Fn(usize, &mut [f32]) + Sync)),
     /// Labels; 0 is nodata.
     U32(&'a [u32]),
     /// Classes; 0 is nodata.
     U8(&'a [u8]),
 }
 
-impl Samples<'_> {
-    fn len(&self) -> usize {
+impl fmt::Debug for Samples<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Samples").field("format", &self.format()).field("len", &self.len()).finish()
+    }
+}
+
+impl<'a> Samples<'a> {
+    /// Number of the values; `None` if they are made on demand.
+    fn len(&self) -> Option<usize> {
         match self {
-            Self::F32(v) => v.len(),
-            Self::U32(v) => v.len(),
-            Self::U8(v) => v.len(),
+            Self::F32(v) => Some(v.len()),
+            Self::F32Rows(_) => None,
+            Self::U32(v) => Some(v.len()),
+            Self::U8(v) => Some(v.len()),
         }
     }
 
     fn bytes_per_sample(&self) -> usize {
         match self {
-            Self::F32(_) | Self::U32(_) => 4,
+            Self::F32(_) | Self::F32Rows(_) | Self::U32(_) => 4,
             Self::U8(_) => 1,
         }
     }
 
     fn format(&self) -> SampleFormat {
         match self {
-            Self::F32(_) => SampleFormat::IEEEFP,
+            Self::F32(_) | Self::F32Rows(_) => SampleFormat::IEEEFP,
             Self::U32(_) | Self::U8(_) => SampleFormat::Uint,
         }
     }
 
     /// TIFF's predictor: 2 horizontal differences, 3 the floating-point one.
     fn predictor(&self) -> u16 {
-        if matches!(self, Self::F32(_)) { 3 } else { 2 }
+        if self.format() == SampleFormat::IEEEFP { 3 } else { 2 }
     }
 
     fn nodata(&self) -> &'static str {
-        if matches!(self, Self::F32(_)) { "nan" } else { "0" }
+        if self.format() == SampleFormat::IEEEFP { "nan" } else { "0" }
     }
+
+    /// Rows of `cols` values each; `made` is room for those that are made.
+    fn rows<'s>(&self, rows: Range<usize>, cols: usize, made: &'s mut Vec<f32>) -> Lines<'s>
+    where
+        'a: 's,
+    {
+        let range = rows.start * cols..rows.end * cols;
+        match self {
+            Self::F32(v) => Lines::F32(&v[range]),
+            Self::F32Rows(make) => {
+                made.resize(range.len(), 0.0);
+                let lines = made.par_chunks_mut(cols).zip(rows);
+                lines.for_each(|(line, row)| make(row, line));
+                Lines::F32(made)
+            }
+            Self::U32(v) => Lines::U32(&v[range]),
+            Self::U8(v) => Lines::U8(&v[range]),
+        }
+    }
+}
+
+/// Some rows of a band.
+#[derive(Clone, Copy)]
+enum Lines<'a> {
+    F32(&'a [f32]),
+    U32(&'a [u32]),
+    U8(&'a [u8]),
 }
 
 /// Writes `bands` on `frame`, which lies in `crs`, as one GeoTIFF, bands in separate planes.
@@ -94,7 +134,7 @@ pub fn write_geotiff(
 ) -> io::Result<()> {
     let keys = &crs.geo_keys();
     check(frame, bands).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
-    let bytes: usize = bands.iter().map(|b| b.samples.len() * b.samples.bytes_per_sample()).sum();
+    let bytes: usize = bands.iter().map(|b| frame.nodes() * b.samples.bytes_per_sample()).sum();
     let written = if bytes > CLASSIC_BYTES {
         write::<_, TiffKindBig>(out, frame, keys, bands)
     } else {
@@ -113,16 +153,18 @@ fn check(frame: &GridFrame, bands: &[Band<'_>]) -> Result<(), String> {
         return Err("the raster has too many columns, rows or bands for TIFF".into());
     }
     for band in bands {
-        if band.samples.len() != frame.nodes() {
+        if let Some(len) = band.samples.len()
+            && len != frame.nodes()
+        {
             return Err(format!(
-                "band \"{}\" has {} values for a grid of {} × {}",
+                "band \"{}\" has {len} values for a grid of {} × {}",
                 band.description,
-                band.samples.len(),
                 frame.cols(),
                 frame.rows()
             ));
         }
-        if std::mem::discriminant(&band.samples) != std::mem::discriminant(&first.samples) {
+        let kind = |samples: &Samples<'_>| (samples.format().to_u16(), samples.bytes_per_sample());
+        if kind(&band.samples) != kind(&first.samples) {
             return Err("the bands of a raster must have the same sample type".into());
         }
     }
@@ -231,11 +273,14 @@ fn write_tiles<W: Write + Seek, K: TiffKind>(
 ) -> TiffResult<()> {
     let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
     for band in bands {
+        let mut made = Vec::new();
         for row in (0..frame.rows()).step_by(TILE) {
             // Compressed in parallel a row of tiles at a time, which bounds the memory.
+            let rows = row..(row + TILE).min(frame.rows());
+            let lines = band.samples.rows(rows, frame.cols(), &mut made);
             let tiles = (0..frame.cols().div_ceil(TILE))
                 .into_par_iter()
-                .map(|tile| compress(&filtered(frame, band.samples, tile * TILE, row)))
+                .map(|tile| compress(&filtered(lines, frame.cols(), tile * TILE)))
                 .collect::<io::Result<Vec<_>>>()?;
             for tile in &tiles {
                 let offset = directory.write_data(&tile[..])?;
@@ -248,25 +293,22 @@ fn write_tiles<W: Write + Seek, K: TiffKind>(
     directory.write_tag(Tag::TileByteCounts, K::convert_slice(&sizes))
 }
 
-/// The bytes of the tile whose first pixel is `(col, row)`, after the predictor; zero beyond the edge.
-fn filtered(frame: &GridFrame, samples: Samples<'_>, col: usize, row: usize) -> Vec<u8> {
-    let mut tile = Vec::with_capacity(TILE * TILE * samples.bytes_per_sample());
-    let width = TILE.min(frame.cols() - col);
-    for row in row..row + TILE {
-        let start = frame.index(col, row.min(frame.rows() - 1));
-        let line = if row < frame.rows() { start..start + width } else { 0..0 };
-        match samples {
-            Samples::F32(values) => float_differences(&values[line], &mut tile),
-            Samples::U32(values) => {
+/// The bytes of the tile from column `col` on of a row of tiles, after the predictor; zero beyond the edge.
+fn filtered(lines: Lines<'_>, cols: usize, col: usize) -> Vec<u8> {
+    let mut tile = Vec::with_capacity(TILE * TILE * size_of::<f32>());
+    for row in 0..TILE {
+        match lines {
+            Lines::F32(values) => float_differences(part(values, cols, row, col), &mut tile),
+            Lines::U32(values) => {
                 let mut left = 0u32;
-                for here in padded(&values[line]) {
+                for here in padded(part(values, cols, row, col)) {
                     tile.extend(here.wrapping_sub(left).to_ne_bytes());
                     left = here;
                 }
             }
-            Samples::U8(values) => {
+            Lines::U8(values) => {
                 let mut left = 0u8;
-                for here in padded(&values[line]) {
+                for here in padded(part(values, cols, row, col)) {
                     tile.push(here.wrapping_sub(left));
                     left = here;
                 }
@@ -274,6 +316,12 @@ fn filtered(frame: &GridFrame, samples: Samples<'_>, col: usize, row: usize) -> 
         }
     }
     tile
+}
+
+/// The part of a row of `cols` values that a tile from column `col` on has; nothing of a row beyond the last.
+fn part<T>(values: &[T], cols: usize, row: usize, col: usize) -> &[T] {
+    let start = row * cols + col;
+    if start < values.len() { &values[start..start + TILE.min(cols - col)] } else { &[] }
 }
 
 /// One line of a tile: the values, then zeros.
@@ -343,6 +391,21 @@ mod tests {
         for (i, (a, b)) in read.iter().zip(&values).enumerate() {
             assert!(a == b || (i == 5 && a.is_nan()), "{a} for {b} at {i}");
         }
+    }
+
+    #[test]
+    fn rows_made_on_demand_are_those_of_a_slice() {
+        let frame = frame(300, 270);
+        let value = |row: usize, col: usize| (row * 300 + col) as f32;
+        let values: Vec<f32> = (0..frame.nodes()).map(|i| value(i / 300, i % 300)).collect();
+        let make = |row: usize, line: &mut [f32]| {
+            line.iter_mut().enumerate().for_each(|(col, v)| *v = value(row, col));
+        };
+        let band = |samples| Band { description: "distance", samples };
+        assert_eq!(
+            written(&frame, &[band(Samples::F32Rows(&make)), band(Samples::F32(&values))]),
+            written(&frame, &[band(Samples::F32(&values)), band(Samples::F32Rows(&make))]),
+        );
     }
 
     #[test]

@@ -3,13 +3,16 @@
 use super::Sym2;
 use crate::HeightJet;
 
-/// `G⁻¹`: the speed tensor of the geodesic distance.
-pub(super) fn isotropic(jet: &HeightJet) -> Sym2 {
-    let HeightJet { zx, zy, .. } = *jet;
-    Sym2::new(1.0 + zy * zy, -zx * zy, 1.0 + zx * zx) * (1.0 + zx * zx + zy * zy).recip()
+/// `G⁻¹`, the speed tensor of the geodesic distance, and its determinant.
+#[inline(always)]
+pub(super) fn isotropic(jet: &HeightJet) -> (Sym2, f64) {
+    let (zx, zy) = (jet.zx, jet.zy);
+    let inverse = 1.0 / (1.0 + zx * zx + zy * zy);
+    let d = Sym2::new((1.0 + zy * zy) * inverse, -zx * zy * inverse, (1.0 + zx * zx) * inverse);
+    (d, inverse)
 }
 
-/// `D = Σ_i s_i w_i w_iᵀ` with `s_i = 1/(δ+|κ_i|)`, in ground axes.
+/// `D = Σ_i s_i w_i w_iᵀ` with `s_i = 1/(δ+|κ_i|)`, in ground axes, and its determinant.
 ///
 /// With the shape operator `S = G⁻¹B` this is `f(S) G⁻¹` for `f(κ) = 1/(δ+|κ|)`, and a function of a 2×2
 /// matrix is linear in it: `f(S) = a S + b I` with the divided difference `a = (f1−f2)/(κ1−κ2)`.
@@ -21,24 +24,41 @@ pub(super) fn isotropic(jet: &HeightJet) -> Sym2 {
 ///   K < 0:  q = −H/r,     c = δ + r + H²/r        |κ1|+|κ2| = 2r,  r = √(H²−K)
 /// ```
 ///
-/// without directions, so nothing is undetermined at an umbilic, and without cancellation.
-pub(super) fn curvature(jet: &HeightJet, delta: f64) -> Sym2 {
-    let inverse_first = isotropic(jet);
-    let w2 = 1.0 + jet.zx * jet.zx + jet.zy * jet.zy;
-    let second = Sym2::new(jet.zxx, jet.zxy, jet.zyy) * w2.sqrt().recip();
-    let gaussian = second.det() / w2;
-    let mean = 0.5
-        * (inverse_first.xx * second.xx
-            + 2.0 * inverse_first.xy * second.xy
-            + inverse_first.yy * second.yy);
-    let (q, c, sum) = if gaussian >= 0.0 {
-        (-mean.signum(), delta + 2.0 * mean.abs(), 2.0 * mean.abs())
+/// without directions, so nothing is undetermined at an umbilic, and without cancellation. With the Hessian `Z`,
+/// `w = 1 + |∇z|²` and the adjugate `A = w G⁻¹` of `G`, everything scales by powers of `√w`, and of six divisions two
+/// are left:
+///
+/// ```text
+///   p = tr(AZ)/2 = H w√w ,   h = det Z = K w² ,   ρ = √(p² − hw) = r w√w ,   e = δ w√w
+///   D = √w ( q AZA + c A ) / (e² + e s + |h|w) ,            det D = w² / (e² + e s + |h|w)
+///   K ≥ 0:  q = −sign p,  c = e + 2|p|,           s = 2|p|
+///   K < 0:  q = −p/ρ,     c = e + ρ + p²/ρ,       s = 2ρ
+/// ```
+#[inline(always)]
+pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
+    let HeightJet { zx, zy, zxx, zxy, zyy, .. } = *jet;
+    let a = Sym2::new(1.0 + zy * zy, -zx * zy, 1.0 + zx * zx);
+    let w = 1.0 + zx * zx + zy * zy;
+    let root = w.sqrt();
+    // AZ, which is not symmetric, and its product with A, which is.
+    let (az11, az12) = (a.xx * zxx + a.xy * zxy, a.xx * zxy + a.xy * zyy);
+    let (az21, az22) = (a.xy * zxx + a.yy * zxy, a.xy * zxy + a.yy * zyy);
+    let aza =
+        Sym2::new(az11 * a.xx + az12 * a.xy, az11 * a.xy + az12 * a.yy, az21 * a.xy + az22 * a.yy);
+    let p = 0.5 * (az11 + az22);
+    let hw = (zxx * zyy - zxy * zxy) * w;
+    let e = delta * w * root;
+    let saddle = hw < 0.0;
+    // At a saddle there is nothing to cancel under the root; elsewhere it is not used.
+    let rho = (p * p + hw.abs()).sqrt();
+    let q_saddle = -p / rho;
+    let (q, c, sum) = if saddle {
+        (q_saddle, e + rho - p * q_saddle, 2.0 * rho)
     } else {
-        let r = (mean * mean - gaussian).sqrt();
-        (-mean / r, delta + r + mean * mean / r, 2.0 * r)
+        (-1f64.copysign(p), e + 2.0 * p.abs(), 2.0 * p.abs())
     };
-    (inverse_first.sandwich(second) * q + inverse_first * c)
-        * (delta * delta + delta * sum + gaussian.abs()).recip()
+    let inverse = 1.0 / (e * e + e * sum + hw.abs());
+    ((aza * q + a * c) * (root * inverse), w * w * inverse)
 }
 
 #[cfg(test)]
@@ -82,7 +102,9 @@ mod tests {
         {
             for (zx, zy) in [(0.0, 0.0), (0.7, -0.3), (-2.0, 1.5)] {
                 let jet = HeightJet { z: 0.0, zx, zy, zxx, zxy, zyy };
-                assert!(close(curvature(&jet, 0.01), by_eigenvectors(&jet, 0.01)), "{jet:?}");
+                let (d, det) = curvature(&jet, 0.01);
+                assert!(close(d, by_eigenvectors(&jet, 0.01)), "{jet:?}");
+                assert!((det / d.det() - 1.0).abs() < 1e-11, "{jet:?}");
             }
         }
     }
@@ -90,10 +112,10 @@ mod tests {
     #[test]
     fn planes_and_umbilics_are_isotropic() {
         let plane = HeightJet { zx: 0.4, zy: -0.2, ..HeightJet::default() };
-        assert!(close(curvature(&plane, 0.05), isotropic(&plane) * 20.0));
+        assert!(close(curvature(&plane, 0.05).0, isotropic(&plane).0 * 20.0));
         let umbilic = HeightJet { zxx: 0.03, zyy: 0.03, ..HeightJet::default() };
-        assert!(close(curvature(&umbilic, 0.01), isotropic(&umbilic) * 25.0));
+        assert!(close(curvature(&umbilic, 0.01).0, isotropic(&umbilic).0 * 25.0));
         let saddle = HeightJet { zxx: 0.03, zyy: -0.03, ..HeightJet::default() };
-        assert!(close(curvature(&saddle, 0.01), isotropic(&saddle) * 25.0));
+        assert!(close(curvature(&saddle, 0.01).0, isotropic(&saddle).0 * 25.0));
     }
 }

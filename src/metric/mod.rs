@@ -13,6 +13,7 @@
 //! On the curvature metric a step along a direction of high normal curvature is dear, so routes turn
 //! away from changing slopes and follow valleys, ridges and hillsides.
 
+mod block;
 mod curvature;
 mod sym2;
 
@@ -21,7 +22,9 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
+pub(crate) use self::block::SpeedBlock;
 pub use self::sym2::Sym2;
+use crate::surface::BLOCK;
 use crate::{Error, HeightJet, HeightSurface, Result};
 
 /// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
@@ -104,6 +107,7 @@ pub struct MetricField<'a> {
     surface: &'a HeightSurface,
     speed: Speed,
     climb_weight: f64,
+    /// Row-major; empty if all are open.
     open: Vec<bool>,
 }
 
@@ -194,6 +198,13 @@ fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> 
         }
         None => None,
     };
+    let all_open = !surface.has_voids()
+        && barrier.is_none()
+        && steepest.is_none()
+        && !matches!(speed, Speed::Tensor(_));
+    if all_open {
+        return Ok(Vec::new());
+    }
     let mut open = vec![true; frame.nodes()];
     open.par_chunks_mut(frame.cols()).enumerate().for_each(|(row, open)| {
         let too_steep = |jet: &HeightJet, limit: f64| jet.zx.hypot(jet.zy) > limit;
@@ -252,7 +263,7 @@ impl<'a> MetricField<'a> {
     /// Whether the node may be entered: no void, no barrier, not too steep.
     #[must_use]
     pub fn is_open(&self, col: usize, row: usize) -> bool {
-        self.open[self.surface.frame().index(col, row)]
+        self.open.is_empty() || self.open[self.surface.frame().index(col, row)]
     }
 
     /// Speed tensor `D` in ground axes (x east, y north, metres) at grid coordinates `at`, from the spline's exact
@@ -262,26 +273,48 @@ impl<'a> MetricField<'a> {
         self.speed_of(&self.surface.jet(at), |tensors| self.bilinear(tensors, at))
     }
 
-    /// Speed tensors at all nodes of a row.
-    pub(crate) fn row_speeds(&self, row: usize, jets: &mut [HeightJet], out: &mut [Sym2]) {
-        self.surface.row_jets(row, jets);
-        let start = self.surface.frame().index(0, row);
-        for (col, (jet, out)) in jets.iter().zip(out).enumerate() {
-            *out = self.speed_of(jet, |tensors| tensors[start + col]);
+    /// Speed tensors at the nodes of the block whose first is `(col, row)`; nodes beyond the grid are closed.
+    pub(crate) fn block_speeds(&self, col: usize, row: usize, speeds: &mut SpeedBlock) {
+        let frame = self.surface.frame();
+        self.surface.block_jets(col, row, &mut speeds.jets);
+        let (cols, rows) = (BLOCK.min(frame.cols() - col), BLOCK.min(frame.rows() - row));
+        if let Speed::Tensor(tensors) = &self.speed {
+            for j in 0..rows {
+                let start = frame.index(col, row + j);
+                for (i, d) in tensors[start..start + cols].iter().enumerate() {
+                    speeds.set(j, i, (*d, d.det()));
+                }
+            }
+        }
+        block::of_jets(&self.speed, self.climb_weight, speeds);
+        for (j, det) in speeds.det.iter_mut().enumerate() {
+            if j >= rows {
+                *det = [0.0; BLOCK];
+                continue;
+            }
+            det[cols..].fill(0.0);
+            if !self.open.is_empty() {
+                let start = frame.index(col, row + j);
+                for (det, open) in det.iter_mut().zip(&self.open[start..start + cols]) {
+                    *det = if *open { *det } else { 0.0 };
+                }
+            }
         }
     }
 
     fn speed_of(&self, jet: &HeightJet, tensor: impl Fn(&[Sym2]) -> Sym2) -> Sym2 {
-        let d = match &self.speed {
+        let speed = match &self.speed {
             Speed::Isotropic => curvature::isotropic(jet),
             Speed::Curvature { delta } => curvature::curvature(jet, *delta),
-            Speed::Tensor(tensors) => tensor(tensors),
+            Speed::Tensor(tensors) => {
+                let d = tensor(tensors);
+                (d, d.det())
+            }
         };
         if self.climb_weight == 0.0 {
-            return d;
+            return speed.0;
         }
-        let grade = Sym2::outer(DVec2::new(jet.zx, jet.zy));
-        (d.inverse() + grade * self.climb_weight).inverse()
+        averse_to_climb(speed, jet, self.climb_weight).0
     }
 
     fn bilinear(&self, tensors: &[Sym2], at: DVec2) -> Sym2 {
@@ -326,4 +359,18 @@ impl<'a> MetricField<'a> {
             })
             .sum()
     }
+}
+
+/// The inverse of `M + β ∇z∇zᵀ` and its determinant, from `D = M⁻¹` and its own. By Cramer's rule, without cancellation,
+///
+/// ```text
+///   (D + β det D t tᵀ) / (1 + β ∇zᵀD∇z) ,     t = (−z_y, z_x) along the contour.
+/// ```
+#[inline(always)]
+fn averse_to_climb((d, det): (Sym2, f64), jet: &HeightJet, climb_weight: f64) -> (Sym2, f64) {
+    let (zx, zy) = (jet.zx, jet.zy);
+    let form = zx * (d.xx * zx + d.xy * zy) + zy * (d.xy * zx + d.yy * zy);
+    let inverse = 1.0 / (1.0 + climb_weight * form);
+    let along = Sym2::new(zy * zy, -zx * zy, zx * zx);
+    ((d + along * (climb_weight * det)) * inverse, det * inverse)
 }

@@ -24,6 +24,7 @@
 //! | `∫ s‴²`, noise | 0.059 | 0.057 | 0.049 | 0.024 | 0.023 | 0.023 |
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -48,7 +49,9 @@ pub(super) const LANES: usize = 16;
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     pub(super) basis: Basis,
-    nodes: Vec<Local>,
+    pub(super) nodes: Vec<Local>,
+    /// Nodes around the middle one that have its weights, each one coefficient further on than the node before.
+    pub(super) uniform: Range<usize>,
     /// `Σ_i v_i v_iᵀ` with `v_i` the weights at node `i`.
     gram: Banded,
 }
@@ -61,7 +64,8 @@ impl Axis {
         for node in &nodes {
             gram.add_outer(node.start, &node.weights[0][..basis.support()], 1.0);
         }
-        Self { basis, nodes, gram }
+        let uniform = uniform(&nodes);
+        Self { basis, nodes, uniform, gram }
     }
 
     /// Matrix of `∫ (d^order s/dt^order)² dt`, by Gauss's three points per interval: exact to degree 5.
@@ -219,40 +223,15 @@ impl Fit {
 
     /// Values at the nodes of a row.
     pub(super) fn row_values(&self, row: usize, values: &mut [f64]) {
-        let [line] = self.contract(&self.y.nodes[row], [0]);
-        let support = self.x.basis.support();
+        let (width, support) = (self.x.basis.len(), self.x.basis.support());
+        let node = &self.y.nodes[row];
+        let mut line = vec![0.0; width];
+        for (k, weight) in node.weights[0][..self.y.basis.support()].iter().enumerate() {
+            let coefficients = &self.coefficients[(node.start + k) * width..][..width];
+            line.iter_mut().zip(coefficients).for_each(|(sum, c)| *sum += weight * c);
+        }
         for (value, node) in values.iter_mut().zip(&self.x.nodes) {
             *value = dot(&node.weights[0][..support], &line[node.start..]);
-        }
-    }
-
-    /// Derivatives at the nodes of a row: `f` gets the column and `z` differentiated `[i, j]` times
-    /// along columns and rows, `[0,0] [1,0] [0,1] [2,0] [1,1] [0,2]`, per node.
-    pub(super) fn row_derivatives(&self, row: usize, f: impl FnMut(usize, [f64; 6])) {
-        match self.x.basis.support() {
-            4 => self.row_derivatives_of::<4>(row, f),
-            _ => self.row_derivatives_of::<SUPPORT>(row, f),
-        }
-    }
-
-    fn row_derivatives_of<const N: usize>(&self, row: usize, mut f: impl FnMut(usize, [f64; 6])) {
-        let mut lines = self.contract(&self.y.nodes[row], [0, 1, 2]);
-        // The weights beyond a narrow grid's support are 0, but their coefficients must exist.
-        lines.iter_mut().for_each(|line| line.resize(line.len().max(N), 0.0));
-        for (col, Local { start, weights }) in self.x.nodes.iter().enumerate() {
-            let [line, line_y, line_yy] = [0, 1, 2].map(|i| &lines[i][*start..*start + N]);
-            let [value, first, second] = [0, 1, 2].map(|order| &weights[order][..N]);
-            f(
-                col,
-                [
-                    dot(value, line),
-                    dot(first, line),
-                    dot(value, line_y),
-                    dot(second, line),
-                    dot(first, line_y),
-                    dot(value, line_yy),
-                ],
-            );
         }
     }
 
@@ -273,23 +252,20 @@ impl Fit {
                 .sum()
         })
     }
-
-    /// The coefficients along `x` of the given derivatives in `y`.
-    fn contract<const K: usize>(&self, y: &Local, orders: [usize; K]) -> [Vec<f64>; K] {
-        let width = self.x.basis.len();
-        let mut lines = orders.map(|_| vec![0.0; width]);
-        for k in 0..self.y.basis.support() {
-            let row = &self.coefficients[(y.start + k) * width..][..width];
-            for (line, order) in lines.iter_mut().zip(orders) {
-                let weight = y.weights[order][k];
-                line.iter_mut().zip(row).for_each(|(sum, c)| *sum += weight * c);
-            }
-        }
-        lines
-    }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// See [`Axis::uniform`]; empty if there are no nodes.
+fn uniform(nodes: &[Local]) -> Range<usize> {
+    let middle = nodes.len() / 2;
+    let like = |&i: &usize| {
+        nodes[i].weights == nodes[middle].weights
+            && nodes[i].start + middle == nodes[middle].start + i
+    };
+    let first = (0..middle).rev().take_while(like).last().unwrap_or(middle);
+    first..(middle..nodes.len()).take_while(like).last().map_or(middle, |last| last + 1)
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 

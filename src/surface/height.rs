@@ -5,6 +5,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::block::{BLOCK, JetBlock};
+use super::curvature::sum_of_squared_curvatures;
 use super::fit::Fit;
 use super::plan::{Plan, cross_validate, fewest_knots, mean_cell};
 use super::residuals::{Residuals, residuals};
@@ -105,6 +107,8 @@ pub struct HeightJet {
 #[derive(Clone, Debug)]
 pub struct HeightSurface {
     frame: GridFrame,
+    /// Nodes per metre of each row, along and across it.
+    per_metre: Vec<DVec2>,
     fit: Fit,
     /// Row-major; empty if there are none.
     voids: Vec<bool>,
@@ -153,11 +157,12 @@ impl HeightSurface {
         let fit = fit_finite(&frame, heights, &plan, control)?;
         let residuals = residuals(&frame, &fit, heights);
         let mut voids = Vec::new();
-        if heights.iter().any(|z| !z.is_finite()) {
+        if !heights.par_iter().all(|z| z.is_finite()) {
             voids.extend(heights.iter().map(|z| !z.is_finite()));
         }
         let cutoff = (plan.cutoff > 0.0).then_some(plan.cutoff);
-        Ok(Self { frame, fit, voids, residuals, cutoff })
+        let per_metre = (0..frame.rows()).map(|row| frame.spacing(row as f64).recip()).collect();
+        Ok(Self { frame, per_metre, fit, voids, residuals, cutoff })
     }
 
     /// The grid of the terrain.
@@ -197,15 +202,31 @@ impl HeightSurface {
     /// # Panics
     /// If `jets` is shorter than a row, or there is no such row.
     pub fn row_jets(&self, row: usize, jets: &mut [HeightJet]) {
-        let per_metre = self.frame.spacing(row as f64).recip();
-        let jets = &mut jets[..self.frame.cols()];
-        self.fit.row_derivatives(row, |col, d| jets[col] = ground_jet(per_metre, d));
+        let mut block = JetBlock::default();
+        for (i, jets) in jets[..self.frame.cols()].chunks_mut(BLOCK).enumerate() {
+            self.fit.jets(&self.per_metre, i * BLOCK, row..row + 1, &mut block);
+            for (i, jet) in jets.iter_mut().enumerate() {
+                *jet = block.jet(0, i);
+            }
+        }
+    }
+
+    /// Jets of the block whose first node is `(col, row)`.
+    pub(crate) fn block_jets(&self, col: usize, row: usize, jets: &mut JetBlock) {
+        let last = (row + BLOCK).min(self.frame.rows());
+        self.fit.jets(&self.per_metre, col, row..last, jets);
     }
 
     /// Whether the node was a void of the terrain: the surface there is only a continuation.
     #[must_use]
     pub fn is_void(&self, col: usize, row: usize) -> bool {
-        !self.voids.is_empty() && self.voids[self.frame.index(col, row)]
+        self.has_voids() && self.voids[self.frame.index(col, row)]
+    }
+
+    /// Whether any node was a void of the terrain.
+    #[must_use]
+    pub fn has_voids(&self) -> bool {
+        !self.voids.is_empty()
     }
 
     /// How far the surface lies from the heights that are not void.
@@ -231,20 +252,28 @@ impl HeightSurface {
     /// void, in 1/m.
     #[must_use]
     pub fn rms_curvature(&self) -> f64 {
-        let cols = self.frame.cols();
-        let row_sum = |jets: &mut Vec<HeightJet>, row: usize| {
-            self.row_jets(row, jets);
-            let valid = (0..cols).filter(|&col| !self.is_void(col, row));
-            valid.fold((0.0, 0_usize), |(sum, count), col| {
-                (sum + jets[col].squared_curvature(), count + 1)
-            })
-        };
-        let sums: Vec<_> = (0..self.frame.rows())
+        let (cols, rows) = (self.frame.cols(), self.frame.rows());
+        let sums: Vec<_> = (0..rows.div_ceil(BLOCK))
             .into_par_iter()
-            .map_init(|| vec![HeightJet::default(); cols], row_sum)
+            .map(|band| {
+                let (first, mut jets) = (band * BLOCK, JetBlock::default());
+                let (mut sum, mut count) = (0.0, 0);
+                for col in (0..cols).step_by(BLOCK) {
+                    self.block_jets(col, first, &mut jets);
+                    let mut valid = [[false; BLOCK]; BLOCK];
+                    for (j, valid) in valid.iter_mut().enumerate().take(rows - first) {
+                        for (i, valid) in valid.iter_mut().enumerate().take(cols - col) {
+                            *valid = !self.is_void(col + i, first + j);
+                            count += usize::from(*valid);
+                        }
+                    }
+                    sum += sum_of_squared_curvatures(&jets, &valid);
+                }
+                (sum, count)
+            })
             .collect();
-        // Added row by row, so that the sum does not depend on the number of threads.
-        let (sum, count) = sums.iter().fold((0.0, 0), |(s, n), (row, m)| (s + row, n + m));
+        // Added band by band, so that the sum does not depend on the number of threads.
+        let (sum, count) = sums.iter().fold((0.0, 0), |(s, n), (band, m)| (s + band, n + m));
         (sum / count as f64).sqrt() * FRAC_1_SQRT_2
     }
 }

@@ -7,6 +7,7 @@
 
 mod banded;
 mod basis;
+mod block;
 mod curvature;
 mod fit;
 mod height;
@@ -14,6 +15,7 @@ mod plan;
 mod residuals;
 mod voids;
 
+pub(crate) use self::block::{BLOCK, JetBlock, Lanes};
 pub use self::curvature::Curvature;
 pub use self::height::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
 pub use self::residuals::Residuals;

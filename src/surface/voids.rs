@@ -34,7 +34,7 @@ pub(super) fn fit_finite(
     plan: &Plan,
     control: &Control,
 ) -> Result<Fit> {
-    if heights.iter().all(|z| z.is_finite()) {
+    if heights.par_iter().all(|z| z.is_finite()) {
         return Fit::new(frame, heights.to_vec(), plan, control);
     }
     let mut filled = fill(frame, heights, plan, control)?;

@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::crs::{Crs, GeoKeys, key, length_unit};
 use super::tiff::{Directory, Fault, Layout, Outcome, Sample, Tiff, damaged, tag, unsupported};
@@ -211,26 +212,26 @@ fn void_nodata(
     mask: Option<&[f64]>,
     notes: &mut Vec<String>,
 ) {
-    if let Some(text) = nodata {
-        match text.replace(',', ".").parse::<f64>() {
-            // A value out of the range of the samples is not met, as it should be.
-            Ok(nodata) => {
-                let nodata = sample.round(nodata);
-                values.iter_mut().filter(|v| **v == nodata).for_each(|v| *v = f64::NAN);
-            }
-            Err(_) => {
-                notes.push(format!("the nodata value `{text}` is not a number and was left alone"))
-            }
+    let nodata = nodata.and_then(|text| match text.replace(',', ".").parse::<f64>() {
+        // A value out of the range of the samples is not met, as it should be.
+        Ok(nodata) => Some(sample.round(nodata)),
+        Err(_) => {
+            notes.push(format!("the nodata value `{text}` is not a number and was left alone"));
+            None
         }
-    }
-    super::void_infinite(values);
-    for (value, valid) in values.iter_mut().zip(mask.unwrap_or_default()) {
-        // An absent part of the mask is `NaN`, and not valid.
-        if *valid == 0.0 || valid.is_nan() {
-            *value = f64::NAN;
-        }
-    }
-    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    });
+    // An absent part of the mask is `NaN`, and not valid.
+    let masked = |i: usize| mask.is_some_and(|mask| mask[i] == 0.0 || mask[i].is_nan());
+    let lowest = values
+        .par_iter_mut()
+        .enumerate()
+        .map(|(i, value)| {
+            if Some(*value) == nodata || value.is_infinite() || masked(i) {
+                *value = f64::NAN;
+            }
+            *value
+        })
+        .reduce(|| f64::INFINITY, f64::min);
     // Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
     if lowest < -12_000.0 || lowest == -9999.0 {
         notes.push(format!(
@@ -275,7 +276,7 @@ fn scale(values: &mut [f64], metadata: &str, band: usize) -> Outcome<()> {
     };
     let (scale, offset) = (number("scale", 1.0)?, number("offset", 0.0)?);
     if (scale, offset) != (1.0, 0.0) {
-        values.iter_mut().for_each(|v| *v = scale * *v + offset);
+        values.par_iter_mut().for_each(|v| *v = scale * *v + offset);
     }
     Ok(())
 }

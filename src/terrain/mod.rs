@@ -15,6 +15,7 @@ use std::io::Read;
 use std::path::Path;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 pub mod synthetic;
 
@@ -98,7 +99,7 @@ impl Terrain {
         let mut heights = raster.bands.swap_remove(0);
         let metres = raster.source.metres_per_height_unit;
         if metres != 1.0 {
-            heights.iter_mut().for_each(|h| *h *= metres);
+            heights.par_iter_mut().for_each(|h| *h *= metres);
         }
         let mut terrain = Self::new(frame, heights, raster.crs)?;
         match terrain.statistics().1 {
@@ -126,6 +127,12 @@ impl Terrain {
         &self.heights
     }
 
+    /// Gives the memory of the heights back, once only the place of the terrain matters: [`heights`](Self::heights) is
+    /// empty from then on, and no node counts as a void.
+    pub fn free_heights(&mut self) {
+        self.heights = Vec::new();
+    }
+
     /// The coordinate reference system.
     #[must_use]
     pub fn crs(&self) -> &Crs {
@@ -147,19 +154,22 @@ impl Terrain {
     /// Whether the node is a void.
     #[must_use]
     pub fn is_void(&self, col: usize, row: usize) -> bool {
-        self.heights[self.frame.index(col, row)].is_nan()
+        self.heights.get(self.frame.index(col, row)).is_some_and(|height| height.is_nan())
     }
 
     /// Number of voids, and smallest, largest and mean height in metres (`None` if all are void).
     #[must_use]
     pub fn statistics(&self) -> (usize, Option<[f64; 3]>) {
-        let (mut count, mut min, mut max, mut sum) = (0, f64::INFINITY, f64::NEG_INFINITY, 0.0);
-        for height in self.heights.iter().filter(|h| !h.is_nan()) {
-            count += 1;
-            min = height.min(min);
-            max = height.max(max);
-            sum += height;
-        }
+        const NONE: (usize, f64, f64, f64) = (0, f64::INFINITY, f64::NEG_INFINITY, 0.0);
+        let of_row = |row: &[f64]| {
+            row.iter().filter(|h| !h.is_nan()).fold(NONE, |(count, min, max, sum), h| {
+                (count + 1, h.min(min), h.max(max), sum + h)
+            })
+        };
+        let rows: Vec<_> = self.heights.par_chunks(self.frame.cols()).map(of_row).collect();
+        // Added row by row, so that the sum does not depend on the number of threads.
+        let (count, min, max, sum) =
+            rows.into_iter().fold(NONE, |a, b| (a.0 + b.0, a.1.min(b.1), a.2.max(b.2), a.3 + b.3));
         (self.heights.len() - count, (count > 0).then(|| [min, max, sum / count as f64]))
     }
 
@@ -213,7 +223,7 @@ pub fn read_bands(path: impl AsRef<Path>) -> Result<RasterBands> {
 
 /// Infinite cells carry no height either.
 fn void_infinite(values: &mut [f64]) {
-    values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
+    values.par_iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
 }
 
 /// What a reader is asked for.

@@ -636,15 +636,15 @@ impl<'a> Layout<'a> {
 
     /// The samples of a band, row by row as stored; `NaN` where a chunk is absent.
     pub(super) fn band(&self, band: usize) -> Outcome<Vec<f64>> {
-        let mut values = Vec::new();
         let cells = self.cols * self.rows;
-        if values.try_reserve_exact(cells).is_err() {
+        // Only to see if there is room: zeroed memory costs nothing before it is used, and then the threads share the cost.
+        if Vec::<f64>::new().try_reserve_exact(cells).is_err() {
             return unsupported(format!(
                 "{} × {} cells do not fit in memory",
                 self.cols, self.rows
             ));
         }
-        values.resize(cells, f64::NAN);
+        let mut values = vec![0.0; cells];
         // The first fault of the file, so that the message does not depend on the threads.
         let fault = values
             .par_chunks_mut(self.chunk.1 * self.cols)
@@ -661,9 +661,13 @@ impl<'a> Layout<'a> {
         let chunk_rows = if self.tiled { self.chunk.1 } else { rows.len() / self.cols };
         for tile in 0..across {
             let index = (plane * self.chunks_down() + down) * across + tile;
-            let Some(bytes) = self.read_chunk(index, chunk_rows)? else { continue };
             let left = tile * self.chunk.0;
             let width = self.chunk.0.min(self.cols - left);
+            let Some(bytes) = self.read_chunk(index, chunk_rows)? else {
+                let lines = rows.chunks_exact_mut(self.cols);
+                lines.for_each(|line| line[left..left + width].fill(f64::NAN));
+                continue;
+            };
             let stored_rows = bytes.chunks_exact(self.row_bytes);
             for (out, row) in rows.chunks_exact_mut(self.cols).zip(stored_rows) {
                 let out = &mut out[left..left + width];

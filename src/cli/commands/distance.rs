@@ -1,6 +1,9 @@
 //! `ridgeway distance`: the distance from the start at every cell.
 
-use ridgeway::export::{isolines, isolines_geojson, levels_by_step, round_step};
+use std::path::Path;
+
+use rayon::prelude::*;
+use ridgeway::export::{Samples, isolines, isolines_geojson, levels_by_step, round_step};
 use ridgeway::{Control, DistanceMap, MetricField, Result};
 use serde_json::{Value, json};
 
@@ -22,47 +25,58 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
         check_file(path, &["geojson", "json"], args.overwrite, Some(&args.dem))?;
     }
     let places = (&args.start.start[..], &args.goal[..]);
-    let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    let mut journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    journey.terrain.free_heights();
+    let journey = journey;
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
     let map = journey.solve(&field, true)?;
-    let values = map.to_row_major();
     control.check()?;
     let provenance = journey.provenance(std::slice::from_ref(&field));
     if let Some(path) = &args.isolines {
-        let content = isolines_file(args, &journey, &map, &values, &provenance)?;
+        let content = isolines_file(args, &journey, &map, &provenance)?;
         write_content(path, args.overwrite, &content)?;
     }
     if let Some(path) = &args.output {
-        write_raster(path, args.overwrite, &journey.terrain, &bands(args, &map, values.clone()))?;
+        write_map(path, args, &journey, &map)?;
     }
-    let report = report(args, &journey, &field, &map, values, &provenance);
+    let report = report(args, &journey, &field, &map, &provenance);
     let written: String = outputs.iter().map(|path| wrote(path)).collect();
     Report { text: report.text + &written, json: report.json }.print(run)
 }
 
-fn bands(args: &DistanceArgs, map: &DistanceMap, values: Vec<f32>) -> Vec<(String, Vec<f32>)> {
-    let mut bands = vec![(format!("distance ({})", map.unit()), values)];
+fn write_map(
+    path: &Path,
+    args: &DistanceArgs,
+    journey: &Journey<'_>,
+    map: &DistanceMap,
+) -> Result<()> {
+    let values = |row: usize, line: &mut [f32]| {
+        let nodes = line.iter_mut().enumerate();
+        nodes.for_each(|(col, value)| *value = map.at_node(col, row) as f32);
+    };
+    let azimuth = |col, row| {
+        let travel = map.direction(col, row)?;
+        Some(travel.x.atan2(travel.y).to_degrees().rem_euclid(360.0) as f32)
+    };
+    let azimuths = |row: usize, line: &mut [f32]| {
+        let nodes = line.iter_mut().enumerate();
+        nodes.for_each(|(col, value)| *value = azimuth(col, row).unwrap_or(f32::NAN));
+    };
+    let mut bands = vec![(format!("distance ({})", map.unit()), Samples::F32Rows(&values))];
     if args.direction {
-        let nodes = (0..map.rows()).flat_map(|row| (0..map.cols()).map(move |col| (col, row)));
-        let azimuth = |(col, row)| {
-            let travel = map.direction(col, row)?;
-            Some(travel.x.atan2(travel.y).to_degrees().rem_euclid(360.0) as f32)
-        };
-        bands.push((
-            "direction of travel (degrees clockwise from north)".into(),
-            nodes.map(|node| azimuth(node).unwrap_or(f32::NAN)).collect(),
-        ));
+        let name = "direction of travel (degrees clockwise from north)".into();
+        bands.push((name, Samples::F32Rows(&azimuths)));
     }
-    bands
+    write_raster(path, args.overwrite, &journey.terrain, &bands)
 }
 
 fn isolines_file(
     args: &DistanceArgs,
     journey: &Journey<'_>,
     map: &DistanceMap,
-    values: &[f32],
     provenance: &Value,
 ) -> Result<Vec<u8>> {
+    let values = &map.to_row_major()[..];
     let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let step = args.step.unwrap_or_else(|| round_step(largest.into(), ISOLINES));
     let frame = journey.terrain.frame();
@@ -71,38 +85,56 @@ fn isolines_file(
     Ok(isolines_geojson(&lines, frame, map.unit(), crs, provenance)?.into_bytes())
 }
 
+/// Number of the cells that are reached and the largest distance of one.
+fn reached(map: &DistanceMap) -> (usize, f64) {
+    let of_row = |row| {
+        let values = (0..map.cols()).map(|col| f64::from(map.at_node(col, row) as f32));
+        values
+            .filter(|v| v.is_finite())
+            .fold((0, 0.0), |(count, largest), value| (count + 1, value.max(largest)))
+    };
+    let both = |a: (usize, f64), b: (usize, f64)| (a.0 + b.0, a.1.max(b.1));
+    (0..map.rows()).into_par_iter().map(of_row).reduce(|| (0, 0.0), both)
+}
+
+/// Distances that these shares of the reached cells do not exceed.
+fn quantiles(map: &DistanceMap) -> Vec<(&'static str, f64)> {
+    let mut values = map.to_row_major();
+    values.retain(|v| v.is_finite());
+    values.par_sort_unstable_by(f32::total_cmp);
+    [("10 %", 0.1), ("25 %", 0.25), ("median", 0.5), ("75 %", 0.75), ("90 %", 0.9)]
+        .into_iter()
+        .filter_map(|(name, share)| {
+            let rank = (values.len().checked_sub(1)? as f64 * share) as usize;
+            Some((name, values[rank].into()))
+        })
+        .collect()
+}
+
 fn report(
     args: &DistanceArgs,
     journey: &Journey<'_>,
     field: &MetricField<'_>,
     map: &DistanceMap,
-    mut values: Vec<f32>,
     provenance: &Value,
 ) -> Report {
-    let nodes = values.len();
-    values.retain(|v| v.is_finite());
-    values.sort_unstable_by(f32::total_cmp);
+    let nodes = map.cols() * map.rows();
+    let (reached, largest) = reached(map);
     let unit = map.unit();
     let mut facts = Facts::default();
     facts.add("metric", field.name());
-    facts.add("reached", format!("{} of {nodes} cells", values.len()));
-    let quantile = |share: f64| f64::from(values[((values.len() - 1) as f64 * share) as usize]);
+    facts.add("reached", format!("{reached} of {nodes} cells"));
     let mut statistics = serde_json::Map::new();
-    let shown: &[(&str, f64)] = match (args.stats, values.is_empty()) {
-        (_, true) => &[],
-        (false, _) => &[("largest", 1.0)],
-        (true, _) => &[
-            ("10 %", 0.1),
-            ("25 %", 0.25),
-            ("median", 0.5),
-            ("75 %", 0.75),
-            ("90 %", 0.9),
-            ("largest", 1.0),
-        ],
+    let mut shown = match args.stats {
+        true => quantiles(map),
+        false => Vec::new(),
     };
-    for &(name, share) in shown {
-        facts.add(name, distance(quantile(share), unit));
-        statistics.insert(name.replace(" %", "_percent"), quantile(share).into());
+    if reached > 0 {
+        shown.push(("largest", largest));
+    }
+    for (name, value) in shown {
+        facts.add(name, distance(value, unit));
+        statistics.insert(name.replace(" %", "_percent"), value.into());
     }
     let mut goals = Vec::new();
     for goal in &journey.goals {
@@ -118,7 +150,7 @@ fn report(
             "unit": unit,
             "delta_per_m": field.delta(),
             "cells": nodes,
-            "reached": values.len(),
+            "reached": reached,
             "distance": statistics,
             "goals": goals,
             "provenance": provenance,

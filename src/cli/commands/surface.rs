@@ -1,5 +1,7 @@
 //! `ridgeway surface`: the fitted surface, its residuals and derivatives.
 
+use rayon::prelude::*;
+use ridgeway::export::Samples;
 use ridgeway::{Control, HeightJet, HeightSurface, Result};
 use serde_json::json;
 
@@ -15,10 +17,14 @@ pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Resul
     let terrain = plan::open(&args.dem, run)?;
     let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
     if let Some(output) = &args.output {
-        let bands: Vec<_> = args
-            .layers
+        let make = |layer: Layer| {
+            let surface = &surface;
+            move |row: usize, line: &mut [f32]| layer.row(surface, row, line)
+        };
+        let rows: Vec<_> = args.layers.iter().map(|&layer| (layer, make(layer))).collect();
+        let bands: Vec<_> = rows
             .iter()
-            .map(|&layer| (layer.description().to_owned(), layer.sample(&surface)))
+            .map(|(layer, make)| (layer.description().to_owned(), Samples::F32Rows(make)))
             .collect();
         control.check()?;
         write_raster(output, args.overwrite, &terrain, &bands)?;
@@ -74,17 +80,20 @@ impl Layer {
         }
     }
 
+    /// The layer at the nodes of a row; `NaN` at voids.
+    fn row(self, surface: &HeightSurface, row: usize, line: &mut [f32]) {
+        let mut jets = vec![HeightJet::default(); line.len()];
+        surface.row_jets(row, &mut jets);
+        for (col, (value, jet)) in line.iter_mut().zip(&jets).enumerate() {
+            *value = if surface.is_void(col, row) { f32::NAN } else { self.of(jet) as f32 };
+        }
+    }
+
     /// The layer at all nodes, row-major; `NaN` at voids.
     pub(super) fn sample(self, surface: &HeightSurface) -> Vec<f32> {
-        let (cols, rows) = (surface.frame().cols(), surface.frame().rows());
-        let mut jets = vec![HeightJet::default(); cols];
-        let mut values = Vec::with_capacity(surface.frame().nodes());
-        for row in 0..rows {
-            surface.row_jets(row, &mut jets);
-            values.extend(jets.iter().enumerate().map(|(col, jet)| {
-                if surface.is_void(col, row) { f32::NAN } else { self.of(jet) as f32 }
-            }));
-        }
+        let mut values = vec![0.0; surface.frame().nodes()];
+        let lines = values.par_chunks_mut(surface.frame().cols()).enumerate();
+        lines.for_each(|(row, line)| self.row(surface, row, line));
         values
     }
 }

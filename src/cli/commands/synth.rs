@@ -1,5 +1,6 @@
 //! `ridgeway synth`: synthetic terrains.
 
+use ridgeway::export::Samples;
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{Control, Crs, Result, Terrain};
 use serde_json::json;
@@ -16,10 +17,14 @@ pub(super) fn run(args: &SynthArgs, run: &RunArgs, control: &Control) -> Result<
     let kind: SyntheticKind = kind.parse()?;
     check_file(output, &["tif", "tiff"], args.overwrite, None)?;
     let terrain = terrain(args, kind)?;
-    let heights = terrain.heights().iter().map(|&z| z as f32).collect();
     control.check()?;
-    write_raster(output, args.overwrite, &terrain, &[("height (m)".into(), heights)])?;
     let frame = terrain.frame();
+    let heights = |row: usize, line: &mut [f32]| {
+        let heights = &terrain.heights()[frame.index(0, row)..];
+        line.iter_mut().zip(heights).for_each(|(value, &z)| *value = z as f32);
+    };
+    let bands = [("height (m)".into(), Samples::F32Rows(&heights))];
+    write_raster(output, args.overwrite, &terrain, &bands)?;
     Report {
         text: wrote(output),
         json: json!({
