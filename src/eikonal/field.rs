@@ -278,7 +278,7 @@ fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorT
 /// Whether a number, and the numbers it is multiplied with, keep within the range of `f32`.
 #[inline(always)]
 fn fits(value: f64) -> bool {
-    (value >= 1e-15) & (value < 1e15)
+    (1e-15..1e15).contains(&value)
 }
 
 #[cfg(test)]

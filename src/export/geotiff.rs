@@ -22,8 +22,9 @@ use crate::{Crs, GridFrame};
 
 /// Side of a tile in pixels, GDAL's default.
 const TILE: usize = 256;
-/// Deflate level: on float terrain a higher one costs several times the time for 1 or 2 % of size.
-const LEVEL: u32 = 3;
+/// Deflate level. On distances over 4000² cells, levels 1, 4 and 6 take 25, 53 and 70 ns per cell of one core and leave
+/// 56, 49 and 48 % of the size.
+const LEVEL: u32 = 1;
 /// Most bytes of samples in a classic TIFF. Its limit is 4 GB; the rest is room for the padding of
 /// edge tiles and for data that Deflate cannot shorten.
 const CLASSIC_BYTES: usize = 3 << 30;

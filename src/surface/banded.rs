@@ -1,5 +1,7 @@
 //! Symmetric positive definite band matrices: factored once, solved for many right-hand sides.
 
+use multiversion::multiversion;
+
 use super::basis::SUPPORT;
 
 /// A symmetric band matrix; `rows[i][d]` is the entry at `(i, i − d)`.
@@ -72,27 +74,9 @@ impl Ldl {
     /// Solves `A X = B` in place for `W` right-hand sides side by side.
     pub(super) fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
         match self.band {
-            3 => self.substitute::<3, W>(x),
-            5 => self.substitute::<5, W>(x),
-            _ => self.substitute::<{ SUPPORT - 1 }, W>(x),
-        }
-    }
-
-    fn substitute<const BAND: usize, const W: usize>(&self, x: &mut [[f64; W]]) {
-        let n = x.len();
-        for i in 1..n {
-            let mut sum = x[i];
-            for d in 1..=BAND.min(i) {
-                subtract(&mut sum, self.lower[i][d], &x[i - d]);
-            }
-            x[i] = sum;
-        }
-        for i in (0..n).rev() {
-            let mut sum = x[i].map(|v| v * self.lower[i][0]);
-            for d in 1..=BAND.min(n - 1 - i) {
-                subtract(&mut sum, self.lower[i + d][d], &x[i + d]);
-            }
-            x[i] = sum;
+            3 => substitute::<3, W>(&self.lower, x),
+            5 => substitute::<5, W>(&self.lower, x),
+            _ => substitute::<{ SUPPORT - 1 }, W>(&self.lower, x),
         }
     }
 
@@ -116,9 +100,37 @@ impl Ldl {
     }
 }
 
+/// Solves `L D Lᵀ X = B` in place, forward and back.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn substitute<const BAND: usize, const W: usize>(lower: &[[f64; SUPPORT]], x: &mut [[f64; W]]) {
+    let n = x.len();
+    for i in 1..n {
+        let mut sum = x[i];
+        for d in 1..=BAND.min(i) {
+            subtract(&mut sum, lower[i][d], &x[i - d]);
+        }
+        x[i] = sum;
+    }
+    for i in (0..n).rev() {
+        let mut sum = x[i];
+        for value in &mut sum {
+            *value *= lower[i][0];
+        }
+        for d in 1..=BAND.min(n - 1 - i) {
+            subtract(&mut sum, lower[i + d][d], &x[i + d]);
+        }
+        x[i] = sum;
+    }
+}
+
+#[inline(always)]
 fn subtract<const W: usize>(sum: &mut [f64; W], factor: f64, x: &[f64; W]) {
-    for (sum, x) in sum.iter_mut().zip(x) {
-        *sum -= factor * x;
+    for i in 0..W {
+        sum[i] -= factor * x[i];
     }
 }
 

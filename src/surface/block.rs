@@ -175,7 +175,7 @@ mod tests {
         let heights: Vec<f64> = (0..frame.nodes()).map(|i| (i as f64).sin() * 1e3).collect();
         for degree in [3, 5] {
             let plan = Plan::every_node(&frame, degree);
-            let fit = Fit::new(&frame, heights.clone(), &plan, &Control::default()).unwrap();
+            let fit = Fit::new(&frame, &heights, &plan, &Control::default()).unwrap();
             assert!(fit.x.uniform.contains(&16) && fit.x.uniform.contains(&31));
             let mut jets = JetBlock::default();
             fit.jets(&[DVec2::ONE; 21], 16, 2..18, &mut jets);

@@ -114,10 +114,10 @@ impl HeightJet {
 ))]
 pub(super) fn sum_of_squared_curvatures(jets: &JetBlock, valid: &[[bool; BLOCK]; BLOCK]) -> f64 {
     let mut sums = [0.0; BLOCK];
-    for row in 0..BLOCK {
+    for (row, valid) in valid.iter().enumerate() {
         for i in 0..BLOCK {
             let square = jets.jet(row, i).squared_curvature();
-            sums[i] += if valid[row][i] { square } else { 0.0 };
+            sums[i] += if valid[i] { square } else { 0.0 };
         }
     }
     sums.iter().sum()

@@ -23,10 +23,12 @@
 //! | `∫ s″²`, noise | 0.006 | 0.028 | 0.035 | 0.032 | 0.031 | 0.030 |
 //! | `∫ s‴²`, noise | 0.059 | 0.057 | 0.049 | 0.024 | 0.023 | 0.023 |
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::DVec2;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::banded::{Banded, Ldl};
@@ -42,8 +44,11 @@ const STAGE: &str = "fitting surface";
 /// rows towards a pole whose cells are less than a quarter as wide as the widest.
 const LONGEST_CUTOFF: f64 = 64.0;
 
-/// Columns that are solved together.
+/// Columns, or rows, that are solved together.
 pub(super) const LANES: usize = 16;
+
+/// Relative difference of cut-offs that is not felt: a wave at the cut-off keeps 0.5 ± 0.0015 of its amplitude.
+const SHARED: f64 = 1e-3;
 
 /// Splines along one axis and their values at the nodes.
 #[derive(Clone, Debug)]
@@ -137,27 +142,12 @@ impl Axis {
     }
 
     /// Right-hand side of the normal equations: `Σ_i v_i z_i`.
-    fn project<const W: usize>(&self, heights: impl Iterator<Item = [f64; W]>) -> Vec<[f64; W]> {
-        match self.basis.support() {
-            4 => self.project_of::<4, W>(heights),
-            _ => self.project_of::<SUPPORT, W>(heights),
-        }
-    }
-
-    fn project_of<const N: usize, const W: usize>(
-        &self,
-        heights: impl Iterator<Item = [f64; W]>,
-    ) -> Vec<[f64; W]> {
+    fn project<const W: usize>(&self, heights: &[[f64; W]]) -> Vec<[f64; W]> {
         // The weights beyond a narrow grid's support are 0, but what they are added to must exist.
-        let mut sums = vec![[0.0; W]; self.basis.len().max(N)];
-        for (node, z) in self.nodes.iter().zip(heights) {
-            let sums = &mut sums[node.start..node.start + N];
-            for (sum, &weight) in sums.iter_mut().zip(&node.weights[0][..N]) {
-                for (sum, z) in sum.iter_mut().zip(&z) {
-                    *sum += weight * z;
-                }
-            }
-        }
+        let mut sums = match self.basis.support() {
+            4 => project::<4, W>(&self.nodes, heights, self.basis.len()),
+            _ => project::<SUPPORT, W>(&self.nodes, heights, self.basis.len()),
+        };
         sums.truncate(self.basis.len());
         sums
     }
@@ -186,6 +176,29 @@ impl Axis {
     }
 }
 
+/// At least `coefficients` sums `Σ_i v_i z_i` of heights with the first `N` weights at their nodes.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn project<const N: usize, const W: usize>(
+    nodes: &[Local],
+    heights: &[[f64; W]],
+    coefficients: usize,
+) -> Vec<[f64; W]> {
+    let mut sums = vec![[0.0; W]; if coefficients > N { coefficients } else { N }];
+    for (node, z) in nodes.iter().zip(heights) {
+        let sums = &mut sums[node.start..node.start + N];
+        for (sum, weight) in sums.iter_mut().zip(&node.weights[0]) {
+            for i in 0..W {
+                sum[i] += weight * z[i];
+            }
+        }
+    }
+    sums
+}
+
 /// Coefficients of a tensor-product spline, row-major, and its two axes.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
@@ -195,30 +208,26 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Fits heights without voids, in place of which the coefficients are built.
+    /// Fits heights without voids.
     pub(super) fn new(
         frame: &GridFrame,
-        mut heights: Vec<f64>,
+        heights: &[f64],
         plan: &Plan,
         control: &Control,
     ) -> Result<Self> {
         let x = Axis::new(plan.degree, frame.cols(), plan.intervals[0]);
         let y = Axis::new(plan.degree, frame.rows(), plan.intervals[1]);
+        let width = x.basis.len();
         control.report(STAGE, 0.0);
-        solve_rows(frame, &x, plan.cutoff, &mut heights, control)?;
-        keep_leading(&mut heights, frame.cols(), x.basis.len());
+        let mut coefficients = vec![0.0; frame.rows() * width];
+        solve_rows(frame, &x, plan.cutoff, heights, &mut coefficients, control)?;
         control.report(STAGE, 0.5);
-        solve_columns(
-            &y,
-            plan.cutoff / frame.mid_spacing().y,
-            &mut heights,
-            x.basis.len(),
-            control,
-        )?;
-        heights.truncate(x.basis.len() * y.basis.len());
-        heights.shrink_to_fit();
+        let cells = plan.cutoff / frame.mid_spacing().y;
+        solve_columns(&y, cells, &mut coefficients, width, control)?;
+        coefficients.truncate(width * y.basis.len());
+        coefficients.shrink_to_fit();
         control.report(STAGE, 1.0);
-        Ok(Self { x, y, coefficients: heights })
+        Ok(Self { x, y, coefficients })
     }
 
     /// Values at the nodes of a row.
@@ -230,8 +239,15 @@ impl Fit {
             let coefficients = &self.coefficients[(node.start + k) * width..][..width];
             line.iter_mut().zip(coefficients).for_each(|(sum, c)| *sum += weight * c);
         }
-        for (value, node) in values.iter_mut().zip(&self.x.nodes) {
-            *value = dot(&node.weights[0][..support], &line[node.start..]);
+        let value = |node: &Local| dot(&node.weights[0][..support], &line[node.start..]);
+        let uniform = self.x.uniform.clone();
+        for col in (0..uniform.start).chain(uniform.end..values.len()) {
+            values[col] = value(&self.x.nodes[col]);
+        }
+        let Some(node) = self.x.nodes.get(uniform.start) else { return };
+        let windows = line[node.start..].windows(support);
+        for (value, window) in values[uniform].iter_mut().zip(windows) {
+            *value = dot(&node.weights[0][..support], window);
         }
     }
 
@@ -269,40 +285,59 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Fits every row; its coefficients take the place of its first heights.
+/// Fits every row of heights: as many rows of `coefficients`.
+///
+/// [`LANES`] rows are solved together. Where meridians converge their cells differ in width; they share the cut-off in
+/// cells of the middle one if that changes none by more than [`SHARED`].
 fn solve_rows(
     frame: &GridFrame,
     axis: &Axis,
     cutoff: f64,
-    heights: &mut [f64],
+    heights: &[f64],
+    coefficients: &mut [f64],
     control: &Control,
 ) -> Result<()> {
+    let (cols, width) = (frame.cols(), axis.basis.len());
     let cells = |row: usize| if cutoff > 0.0 { cutoff / frame.spacing(row as f64).x } else { 0.0 };
     let penalty = axis.penalty(3);
-    let shared = axis.normal(&penalty, cells(0));
-    heights.par_chunks_mut(frame.cols()).enumerate().try_for_each(|(row, heights)| {
+    let top = axis.normal(&penalty, cells(0));
+    let normal = |cells_there: f64| match cells_there == cells(0) {
+        true => Cow::Borrowed(&top),
+        false => Cow::Owned(axis.normal(&penalty, cells_there)),
+    };
+    let groups = heights.par_chunks(LANES * cols).zip(coefficients.par_chunks_mut(LANES * width));
+    groups.enumerate().try_for_each(|(group, (heights, coefficients))| {
         control.check()?;
-        let mut x = axis.project(heights.iter().map(|&z| [z]));
-        if cells(row) == cells(0) {
-            shared.solve(&mut x);
+        let (first, count) = (group * LANES, heights.len() / cols);
+        let shared = cells(first + count / 2);
+        let all = (cells(first) - shared).abs().max((cells(first + count - 1) - shared).abs());
+        if all <= SHARED * shared {
+            solve_lines::<LANES>(axis, &normal(shared), heights, coefficients);
         } else {
-            axis.normal(&penalty, cells(row)).solve(&mut x);
-        }
-        for (height, [coefficient]) in heights.iter_mut().zip(x) {
-            *height = coefficient;
+            let rows = heights.chunks(cols).zip(coefficients.chunks_mut(width));
+            for (i, (heights, coefficients)) in rows.enumerate() {
+                solve_lines::<1>(axis, &normal(cells(first + i)), heights, coefficients);
+            }
         }
         Ok(())
     })
 }
 
-/// Shortens every row of `width` values to its first `kept`.
-fn keep_leading(values: &mut Vec<f64>, width: usize, kept: usize) {
-    if kept < width {
-        let rows = values.len() / width;
-        for row in 1..rows {
-            values.copy_within(row * width..row * width + kept, row * kept);
-        }
-        values.truncate(rows * kept);
+/// Fits at most `W` rows side by side.
+fn solve_lines<const W: usize>(
+    axis: &Axis,
+    normal: &Ldl,
+    heights: &[f64],
+    coefficients: &mut [f64],
+) {
+    let mut lanes = vec![[0.0; W]; axis.nodes.len()];
+    for (i, row) in heights.chunks(axis.nodes.len()).enumerate() {
+        lanes.iter_mut().zip(row).for_each(|(lanes, z)| lanes[i] = *z);
+    }
+    let mut x = axis.project(&lanes);
+    normal.solve(&mut x);
+    for (i, row) in coefficients.chunks_mut(x.len()).enumerate() {
+        row.iter_mut().zip(&x).for_each(|(coefficient, lanes)| *coefficient = lanes[i]);
     }
 }
 
@@ -317,11 +352,11 @@ fn solve_columns(
     let normal = axis.normal(&axis.penalty(3), cells);
     stripes(values, width).into_par_iter().try_for_each(|mut stripe| {
         control.check()?;
-        let mut x = axis.project(stripe.iter().map(|piece| {
-            let mut lanes = [0.0; LANES];
+        let mut lines = vec![[0.0; LANES]; stripe.len()];
+        for (lanes, piece) in lines.iter_mut().zip(&stripe) {
             lanes[..piece.len()].copy_from_slice(piece);
-            lanes
-        }));
+        }
+        let mut x = axis.project(&lines);
         normal.solve(&mut x);
         for (piece, lanes) in stripe.iter_mut().zip(&x) {
             piece.copy_from_slice(&lanes[..piece.len()]);

@@ -74,7 +74,7 @@ pub(super) fn fewest_knots(
     while few < enough {
         let middle = few.midpoint(enough);
         let plan = Plan::coarse(frame, degree, middle);
-        let fit = Fit::new(frame, filled.clone(), &plan, &quiet)?;
+        let fit = Fit::new(frame, &filled, &plan, &quiet)?;
         if residuals(frame, &fit, heights).rms <= rms {
             enough = middle;
         } else {
@@ -106,7 +106,7 @@ pub(super) fn cross_validate(
     let valid = heights.iter().filter(|z| z.is_finite()).count() as f64;
     let score = |log_cells: f64| -> Result<f64> {
         let plan = Plan::smooth(&frame, degree, log_cells.exp2() * cell);
-        let fit = Fit::new(&frame, filled.clone(), &plan, &quiet)?;
+        let fit = Fit::new(&frame, &filled, &plan, &quiet)?;
         let [x, y] = (plan.cutoff / frame.mid_spacing()).to_array();
         let freedom = valid * (1.0 - fit.x.trace(x) * fit.y.trace(y) / frame.nodes() as f64);
         let gcv = (residuals(&frame, &fit, &heights).rms * valid / freedom).powi(2);

@@ -35,18 +35,18 @@ pub(super) fn fit_finite(
     control: &Control,
 ) -> Result<Fit> {
     if heights.par_iter().all(|z| z.is_finite()) {
-        return Fit::new(frame, heights.to_vec(), plan, control);
+        return Fit::new(frame, heights, plan, control);
     }
     let mut filled = fill(frame, heights, plan, control)?;
     let [low, high] = range(heights);
     for _ in 0..ROUNDS {
-        let fit = Fit::new(frame, filled.clone(), plan, control)?;
+        let fit = Fit::new(frame, &filled, plan, control)?;
         let moved = refill(frame, &fit, heights, &mut filled);
         if moved <= SETTLED * (high - low) {
             break;
         }
     }
-    Fit::new(frame, filled, plan, control)
+    Fit::new(frame, &filled, plan, control)
 }
 
 /// Heights with the voids filled by continuing rows and columns, within one range of the data beyond them.

@@ -204,6 +204,9 @@ fn world_file(path: &Path) -> Outcome<Option<Placement>> {
     }
 }
 
+/// Cells that a thread looks at in one go.
+const PART: usize = 1 << 14;
+
 /// Turns nodata, infinite and masked cells to `NaN`, and notes what looks like nodata but is not declared.
 fn void_nodata(
     values: &mut [f64],
@@ -222,16 +225,16 @@ fn void_nodata(
     });
     // An absent part of the mask is `NaN`, and not valid.
     let masked = |i: usize| mask.is_some_and(|mask| mask[i] == 0.0 || mask[i].is_nan());
-    let lowest = values
-        .par_iter_mut()
-        .enumerate()
-        .map(|(i, value)| {
-            if Some(*value) == nodata || value.is_infinite() || masked(i) {
+    let clean = |(part, values): (usize, &mut [f64])| {
+        for (i, value) in values.iter_mut().enumerate() {
+            if Some(*value) == nodata || value.is_infinite() || masked(part * PART + i) {
                 *value = f64::NAN;
             }
-            *value
-        })
-        .reduce(|| f64::INFINITY, f64::min);
+        }
+        values.iter().fold(f64::INFINITY, |low, &v| if v < low { v } else { low })
+    };
+    let lowest =
+        values.par_chunks_mut(PART).enumerate().map(clean).reduce(|| f64::INFINITY, f64::min);
     // Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
     if lowest < -12_000.0 || lowest == -9999.0 {
         notes.push(format!(

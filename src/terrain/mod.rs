@@ -162,8 +162,8 @@ impl Terrain {
     pub fn statistics(&self) -> (usize, Option<[f64; 3]>) {
         const NONE: (usize, f64, f64, f64) = (0, f64::INFINITY, f64::NEG_INFINITY, 0.0);
         let of_row = |row: &[f64]| {
-            row.iter().filter(|h| !h.is_nan()).fold(NONE, |(count, min, max, sum), h| {
-                (count + 1, h.min(min), h.max(max), sum + h)
+            row.iter().filter(|h| !h.is_nan()).fold(NONE, |(count, min, max, sum), &h| {
+                (count + 1, if h < min { h } else { min }, if h > max { h } else { max }, sum + h)
             })
         };
         let rows: Vec<_> = self.heights.par_chunks(self.frame.cols()).map(of_row).collect();

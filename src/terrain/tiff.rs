@@ -415,13 +415,15 @@ impl Compression {
 
     /// The first `length` bytes of what was compressed to `stored`; never more, whatever is in there.
     fn expand(self, stored: &[u8], length: usize) -> Result<Vec<u8>, String> {
-        let mut bytes = Vec::new();
+        /// So much room is made at once; more, which a damaged file may claim, as it is needed.
+        const ROOM: usize = 1 << 24;
+        let mut bytes = Vec::with_capacity(length.min(ROOM));
         match self {
             Self::None => bytes.extend_from_slice(&stored[..length.min(stored.len())]),
             Self::PackBits => bytes = unpack_bits(stored, length),
             Self::Lzw => bytes = expand_lzw(stored, length)?,
             Self::Deflate => {
-                let mut stream = flate2::read::ZlibDecoder::new(stored).take(length as u64);
+                let mut stream = flate2::bufread::ZlibDecoder::new(stored).take(length as u64);
                 stream.read_to_end(&mut bytes).map_err(|e| e.to_string())?;
                 // One step on, to the checksum at the end of the stream.
                 stream.into_inner().read(&mut [0]).map_err(|e| e.to_string())?;
@@ -745,23 +747,32 @@ fn undo_differences<const N: usize>(
     add: impl Fn([u8; N], [u8; N]) -> [u8; N],
 ) {
     let (samples, _) = row.as_chunks_mut::<N>();
-    for i in interleaved..samples.len() {
-        samples[i] = add(samples[i], samples[i - interleaved]);
+    for band in 0..interleaved {
+        let mut sum = [0; N];
+        for sample in samples.iter_mut().skip(band).step_by(interleaved) {
+            sum = add(*sample, sum);
+            *sample = sum;
+        }
     }
 }
 
 /// Predictor 3 (TIFF Technical Note 3): the row is split into planes of bytes, most significant first, and
 /// each byte is stored less the one `interleaved` before it.
 fn undo_float_predictor(row: &mut [u8], size: usize, interleaved: usize) {
-    for i in interleaved..row.len() {
-        row[i] = row[i].wrapping_add(row[i - interleaved]);
-    }
+    undo_differences(row, interleaved, |[a], [b]: [u8; 1]| [a.wrapping_add(b)]);
     let planes = row.to_vec();
-    let samples = row.len() / size;
-    for (i, sample) in row.chunks_exact_mut(size).enumerate() {
-        for (byte, out) in sample.iter_mut().rev().enumerate() {
-            *out = planes[byte * samples + i];
-        }
+    match size {
+        2 => join_planes::<2>(&planes, row),
+        4 => join_planes::<4>(&planes, row),
+        _ => join_planes::<8>(&planes, row),
+    }
+}
+
+/// Little-endian samples of `N` bytes from planes of bytes, most significant first.
+fn join_planes<const N: usize>(planes: &[u8], row: &mut [u8]) {
+    let (samples, _) = row.as_chunks_mut::<N>();
+    for (byte, plane) in planes.chunks_exact(samples.len().max(1)).take(N).enumerate() {
+        samples.iter_mut().zip(plane).for_each(|(sample, value)| sample[N - 1 - byte] = *value);
     }
 }
 
