@@ -68,6 +68,12 @@ impl<'a> Journey<'a> {
         })
     }
 
+    /// Gives the memory of the heights back, for commands that draw no relief.
+    pub(crate) fn without_heights(mut self) -> Self {
+        self.terrain.free_heights();
+        self
+    }
+
     /// The metric that a user who names none wants.
     pub(crate) fn default_metric(&self) -> MetricName {
         if self.tensors.is_some() { MetricName::Tensor } else { MetricName::Curvature }

@@ -215,7 +215,7 @@ fn typical_speed(
     stretch: &[DVec2],
     sample: impl Fn(usize, usize, &mut SpeedBlock),
 ) -> f64 {
-    const SPREAD: usize = 16;
+    const SPREAD: usize = 8;
     let mut speeds = SpeedBlock::default();
     let (mut sum, mut count) = (0, 0);
     for down in (0..tiling.down).step_by(tiling.down.div_ceil(SPREAD).max(1)) {

@@ -25,9 +25,8 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
         check_file(path, &["geojson", "json"], args.overwrite, Some(&args.dem))?;
     }
     let places = (&args.start.start[..], &args.goal[..]);
-    let mut journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
-    journey.terrain.free_heights();
-    let journey = journey;
+    let journey =
+        Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
     let map = journey.solve(&field, true)?;
     control.check()?;

@@ -20,7 +20,8 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
         })
         .collect::<Result<Vec<_>>>()?;
     let places = (&args.start.start[..], &args.goal[..]);
-    let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    let journey =
+        Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
     let map = journey.solve(&field, false)?;
     let mut routes = Vec::new();
