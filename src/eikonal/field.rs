@@ -22,14 +22,19 @@ pub(crate) struct TensorTile {
 impl TensorTile {
     const CLOSED: Self = Self { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
 
-    /// The longest of the steps (1,0), (0,1), (1,1), (1,−1) from any open node: the squares of the last two are
-    /// `(xx + yy ∓ 2xy)/det`, at most `(xx + yy + 2|xy|)/det`.
-    fn longest_step(&self) -> f32 {
-        let squared = |i: usize| {
-            let (xx, xy, det) = (self.xx[i], self.xy[i], self.det[i]);
-            if det > 0.0 { (xx + (det + xy * xy) / xx + 2.0 * xy.abs()) / det } else { 0.0 }
-        };
-        (0..AREA).map(squared).fold(0.0, f32::max).sqrt()
+    /// The tile mirrored on its diagonal, as tensors of the mirrored directions.
+    pub(crate) fn transposed(&self) -> Self {
+        let mut turned = Self::CLOSED;
+        for row in 0..SIDE {
+            for col in 0..SIDE {
+                let (from, to) = (row * SIDE + col, col * SIDE + row);
+                let (xx, xy, det) = (self.xx[from], self.xy[from], self.det[from]);
+                turned.xx[to] = if det > 0.0 { (det + xy * xy) / xx } else { 0.0 };
+                turned.xy[to] = xy;
+                turned.det[to] = det;
+            }
+        }
+        turned
     }
 }
 
@@ -65,8 +70,6 @@ pub struct TensorField {
     pub(super) tiles: Vec<TensorTile>,
     /// `D = scale · stored`, so distance is stored distance divided by [`root_scale`](Self::root_scale).
     root_scale: f64,
-    /// Longest step to a neighbour in each tile, in stored units; 0 where all is closed.
-    pub(super) longest_step: Vec<f32>,
     /// Mean over the open nodes of the length of a cell, `det(D)^(−1/4)`, in stored units.
     pub(super) mean_step: f32,
 }
@@ -145,8 +148,7 @@ impl TensorField {
             .collect::<Result<_>>()?;
         let (sum, count) = sums.iter().fold((0.0, 0), |(s, n), (ds, dn)| (s + ds, n + dn));
         let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
-        let longest_step = tiles.par_iter().map(TensorTile::longest_step).collect();
-        Ok(Self { tiling, tiles, root_scale, longest_step, mean_step: mean_step as f32 })
+        Ok(Self { tiling, tiles, root_scale, mean_step: mean_step as f32 })
     }
 
     /// Columns of the grid.

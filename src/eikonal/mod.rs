@@ -8,6 +8,7 @@
 //! node. [`mod@reference`] is the slow judge.
 
 mod cell;
+mod crew;
 mod field;
 pub mod reference;
 mod source;
@@ -70,7 +71,7 @@ impl Solver {
         goals: &[DVec2],
         control: &Control,
     ) -> Result<DistanceMap> {
-        let mut values = Values::unreached(field.tiling);
+        let mut values = Values::unreached(&field);
         let mut seeds = 0;
         start.seed(&field, |col, row, value| {
             values.lower(col, row, value as f32);
@@ -82,22 +83,22 @@ impl Solver {
                  is too extreme to compute with, as around heights that no terrain has",
             ));
         }
-        let settled = |limit: f32, values: &Values| {
-            !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, values, goal, limit))
+        let done = |is_final: &dyn Fn(usize, usize) -> bool, _: &Values| {
+            !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, goal, is_final))
         };
-        let statistics = tiles::solve(&field, &mut values, self.tolerance, settled, control)?;
+        let (values, statistics) = tiles::solve(&field, values, self.tolerance, done, control)?;
         Ok(DistanceMap { field, values, start: start.clone(), statistics, unit: "", frame: None })
     }
 }
 
-/// Whether the open corners of the goal's cell have values that no news from `limit` on can change.
-fn is_settled(field: &TensorField, values: &Values, goal: DVec2, limit: f32) -> bool {
+/// Whether the open corners of the goal's cell have final values.
+fn is_settled(field: &TensorField, goal: DVec2, is_final: &dyn Fn(usize, usize) -> bool) -> bool {
     let (col, row) = (goal.x.max(0.0) as usize, goal.y.max(0.0) as usize);
     let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (col + i, row + j));
     corners
         .into_iter()
         .filter(|&(c, r)| c < field.cols() && r < field.rows() && field.is_open(c, r))
-        .all(|(c, r)| values.get(c, r) + field.longest_step[field.tiling.place(c, r).0] < limit)
+        .all(|(c, r)| is_final(c, r))
 }
 
 /// Distance from the start region at every node.
@@ -244,7 +245,7 @@ fn best_foot(field: &TensorField, values: &Values, col: usize, row: usize) -> Op
         let (c, r) = (col.checked_add_signed(i as isize), row.checked_add_signed(j as isize));
         match (c, r) {
             (Some(c), Some(r)) if c < field.cols() && r < field.rows() => values.get(c, r),
-            _ => UNREACHED,
+            _ => f32::INFINITY,
         }
     });
     let mut best: Option<(f64, DVec2)> = None;
@@ -264,8 +265,8 @@ fn best_foot(field: &TensorField, values: &Values, col: usize, row: usize) -> Op
                     offer(value, place(axis).lerp(place(diagonal), theta));
                 }
                 (true, false) => offer(f64::from(a) + metric.norm(place(axis)), place(axis)),
-                // Past a reached axis neighbour on the other side; between two walls there is no way.
-                (false, true) if ring[(2 * diagonal + 8 - axis) % 8] < UNREACHED => {
+                // Past an axis neighbour, on this side or the other; between two walls there is no way.
+                (false, true) if a.min(ring[(2 * diagonal + 8 - axis) % 8]) < f32::INFINITY => {
                     offer(f64::from(b) + metric.norm(place(diagonal)), place(diagonal));
                 }
                 _ => {}

@@ -3,7 +3,6 @@
 use super::field::TensorField;
 use super::source::StartRegion;
 use super::tiles::Values;
-use super::update::UNREACHED;
 use super::{DistanceMap, Statistics, best_foot};
 use crate::{Control, Result};
 
@@ -13,7 +12,7 @@ use crate::{Control, Result};
 /// # Errors
 /// Cancelled.
 pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Result<DistanceMap> {
-    let mut values = Values::unreached(field.tiling);
+    let mut values = Values::unreached(&field);
     start.seed(&field, |col, row, value| values.lower(col, row, value as f32));
     let (cols, rows) = (field.cols(), field.rows());
     let mut changed = true;
@@ -26,7 +25,8 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
             for i in 0..cols {
                 let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
                 let old = values.get(col, row);
-                let new = best_foot(&field, &values, col, row).map_or(UNREACHED, |(g, _)| g as f32);
+                let new =
+                    best_foot(&field, &values, col, row).map_or(f32::INFINITY, |(g, _)| g as f32);
                 if new < old {
                     values.lower(col, row, new);
                     changed = true;
