@@ -21,21 +21,6 @@ pub(crate) struct TensorTile {
 
 impl TensorTile {
     const CLOSED: Self = Self { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
-
-    /// The tile mirrored on its diagonal, as tensors of the mirrored directions.
-    pub(crate) fn transposed(&self) -> Self {
-        let mut turned = Self::CLOSED;
-        for row in 0..SIDE {
-            for col in 0..SIDE {
-                let (from, to) = (row * SIDE + col, col * SIDE + row);
-                let (xx, xy, det) = (self.xx[from], self.xy[from], self.det[from]);
-                turned.xx[to] = if det > 0.0 { (det + xy * xy) / xx } else { 0.0 };
-                turned.xy[to] = xy;
-                turned.det[to] = det;
-            }
-        }
-        turned
-    }
 }
 
 /// How the nodes of a grid are cut into tiles.

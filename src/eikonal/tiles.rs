@@ -10,7 +10,7 @@
 
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
-use super::update::{Bench, Block, ROUNDING, UNREACHED};
+use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, UNREACHED};
 use crate::{Control, Error, Result};
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
@@ -79,9 +79,10 @@ struct Outcome {
     values: [f32; AREA],
     /// For each of [`NEIGHBOURS`] the least changed value that could improve it; infinite if none.
     wakes: [f32; 8],
-    slack: f32,
-    longest_step: f32,
+    limits: Limits,
     sweeps: usize,
+    /// Whether the tile changed, and whether it stands still.
+    changed: bool,
     settled: bool,
 }
 
@@ -90,17 +91,35 @@ impl Default for Outcome {
         Self {
             values: [f32::INFINITY; AREA],
             wakes: [f32::INFINITY; 8],
-            slack: 0.0,
-            longest_step: 0.0,
+            limits: Limits::default(),
             sweeps: 0,
+            changed: false,
             settled: true,
         }
     }
 }
 
-/// Neighbours of a tile as (tiles east, tiles south).
-const NEIGHBOURS: [(isize, isize); 8] =
-    [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
+/// Where news of a tile come from, as (tiles east, tiles south): its neighbours, and itself.
+const SIDES: [(isize, isize); 9] =
+    [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (0, 0)];
+const NEIGHBOURS: [(isize, isize); 8] = {
+    let [neighbours @ .., _] = SIDES;
+    neighbours
+};
+const ITSELF: usize = 8;
+
+/// The rows and the columns of a tile next to the given sides. A corner is in the row.
+fn lines_beside(sides: u16) -> [Lines; 2] {
+    const LAST: Lines = 1 << (SIDE - 1);
+    let line = |at: isize| if at > 0 { LAST } else { 1 };
+    (0..SIDES.len()).filter(|side| sides & 1 << side != 0).fold([0; 2], |[rows, cols], side| {
+        match SIDES[side] {
+            (0, 0) => [ALL, cols],
+            (dx, 0) => [rows, cols | line(dx)],
+            (_, dy) => [rows | line(dy), cols],
+        }
+    })
+}
 
 /// Sweeps of a tile before it goes back into the queue.
 const MAX_SWEEPS: usize = 16;
@@ -120,13 +139,11 @@ struct Queue {
     waiting: Vec<u32>,
     /// Least value that may still change the tile; infinite if it does not wait.
     key: Vec<f32>,
-    /// Direction the last news travelled, see [`heading`].
-    heading: Vec<u8>,
-    /// By how much a neighbour's value may exceed that of a node of the tile and still improve it, see
-    /// [`Bench::slack`].
-    slack: Vec<f32>,
-    /// The longest step of any node of the tile; infinite before it was first solved.
-    longest_step: Vec<f32>,
+    /// The sides of the tile that have news, one bit each in the order of [`SIDES`], and which of
+    /// them has the least.
+    sides: Vec<u16>,
+    first: Vec<u8>,
+    limits: Vec<Limits>,
     /// Number of the round that last took the tile or one of its neighbours.
     taken: Vec<u32>,
 }
@@ -136,20 +153,23 @@ impl Queue {
         Self {
             waiting: Vec::new(),
             key: vec![f32::INFINITY; tiles],
-            heading: vec![0; tiles],
-            slack: vec![0.0; tiles],
-            longest_step: vec![f32::INFINITY; tiles],
+            sides: vec![0; tiles],
+            first: vec![0; tiles],
+            limits: vec![Limits::default(); tiles],
             taken: vec![0; tiles],
         }
     }
 
-    fn wake(&mut self, tile: usize, key: f32, heading: u8) {
+    /// News of value `key` from the neighbour `side`.
+    fn wake(&mut self, tile: usize, key: f32, side: usize) {
         if self.key[tile] == f32::INFINITY {
             self.waiting.push(tile as u32);
+            self.sides[tile] = 0;
         }
+        self.sides[tile] |= 1 << side;
         if key < self.key[tile] {
             self.key[tile] = key;
-            self.heading[tile] = heading;
+            self.first[tile] = side as u8;
         }
     }
 
@@ -222,7 +242,7 @@ pub(super) fn solve(
             for (&tile, outcome) in taken.iter().zip(outcomes) {
                 statistics.activations += 1;
                 statistics.sweeps += outcome.sweeps;
-                statistics.tiles += usize::from(queue.longest_step[tile as usize] == f32::INFINITY);
+                statistics.tiles += usize::from(queue.limits[tile as usize].longest_step == 0.0);
                 settle(&tiling, values, queue, tile as usize, outcome);
             }
             control.check()?;
@@ -237,7 +257,7 @@ pub(super) fn solve(
             let least = queue.least_key();
             let is_final = |col: usize, row: usize| {
                 let value = values.get(col, row);
-                value + queue.longest_step[tiling.place(col, row).0] < least
+                value + queue.limits[tiling.place(col, row).0].longest_step < least
             };
             taken.clear();
             if queue.waiting.is_empty() || done(&is_final, values) {
@@ -252,41 +272,46 @@ pub(super) fn solve(
     Ok((shared.values, statistics))
 }
 
-/// Wakes every tile that holds a start value, and its neighbours.
+/// Wakes every tile that holds a start value, and its neighbours, on all sides.
 fn wake_start(field: &TensorField, values: &Values, queue: &mut Queue) {
     for tile in 0..field.tiling.tiles() {
         let least = values.tiles[tile].iter().copied().fold(UNREACHED, f32::min);
         if least < UNREACHED {
-            queue.wake(tile, least, heading(1, 1));
-            for (dx, dy) in NEIGHBOURS {
+            queue.wake(tile, least, ITSELF);
+            for side in 0..8 {
+                let (dx, dy) = NEIGHBOURS[side];
                 if let Some(n) = neighbour(&field.tiling, tile, dx, dy) {
-                    queue.wake(n, least, heading(dx, dy));
+                    queue.wake(n, least, opposite(side));
                 }
             }
         }
     }
 }
 
-/// The first sweeps for news that travel (dx, dy): bit 0 set for sweeps west, bit 1 for sweeps north, bit 2
-/// to sweep along x first.
-fn heading(dx: isize, dy: isize) -> u8 {
-    u8::from(dx < 0) | u8::from(dy < 0) << 1 | u8::from(dy == 0) << 2
+/// The side on which the neighbour sees this tile.
+fn opposite(side: usize) -> usize {
+    (side + 4) % 8
 }
 
 /// Writes a solved tile back and wakes the neighbours it can improve.
 fn settle(tiling: &Tiling, values: &mut Values, queue: &mut Queue, tile: usize, outcome: &Outcome) {
+    let limits = &mut queue.limits[tile];
+    limits.slack = limits.slack.max(outcome.limits.slack);
+    limits.longest_step = limits.longest_step.max(outcome.limits.longest_step);
+    if !outcome.changed {
+        return;
+    }
     values.tiles[tile] = outcome.values;
-    queue.slack[tile] = outcome.slack;
-    queue.longest_step[tile] = outcome.longest_step;
     if !outcome.settled {
         let least = outcome.values.iter().copied().fold(f32::INFINITY, f32::min);
-        queue.wake(tile, least, queue.heading[tile]);
+        queue.wake(tile, least, ITSELF);
     }
-    for ((dx, dy), &key) in NEIGHBOURS.into_iter().zip(&outcome.wakes) {
+    for (side, &key) in outcome.wakes.iter().enumerate() {
+        let (dx, dy) = NEIGHBOURS[side];
         if key < f32::INFINITY
             && let Some(n) = neighbour(tiling, tile, dx, dy)
         {
-            queue.wake(n, key, heading(dx, dy));
+            queue.wake(n, key, opposite(side));
         }
     }
 }
@@ -316,26 +341,36 @@ impl Workbench {
     ) {
         let tensors = &field.tiles[tile];
         shared.values.block(tile, &mut self.block);
-        let heading = shared.queue.heading[tile];
-        let mut along_x = heading & 4 != 0;
-        let mut descending = [heading & 2 != 0, heading & 1 != 0];
         self.bench.load(&self.block);
+        // Sweeps run away from the news.
+        let (dx, dy) = SIDES[shared.queue.first[tile] as usize];
+        let mut descending = [dy > 0, dx > 0];
+        let mut by_columns = dx != 0 && dy == 0;
+        // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
+        let mut owed = lines_beside(shared.queue.sides[tile]);
+        let mut changes = [0; 2];
         outcome.sweeps = 0;
-        outcome.settled = false;
-        while outcome.sweeps < MAX_SWEEPS && !outcome.settled {
-            let descending = &mut descending[usize::from(along_x)];
-            outcome.settled = !self.bench.sweep(tensors, tolerance, along_x, *descending);
-            outcome.sweeps += 1;
-            *descending = !*descending;
-            along_x ^= outcome.sweeps % 2 == 0;
+        outcome.changed = false;
+        while outcome.sweeps < MAX_SWEEPS && (owed, changes) != ([0; 2], [0; 2]) {
+            let side = usize::from(by_columns);
+            let dirty = owed[side] | changes[side];
+            if dirty != 0 {
+                changes = self.bench.sweep(tensors, tolerance, by_columns, descending[side], dirty);
+                owed[side] = 0;
+                outcome.sweeps += 1;
+                outcome.changed |= changes != [0; 2];
+                descending[side] = !descending[side];
+            }
+            by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps % 2 == 0;
         }
-        self.bench.store(&mut self.block);
-        for (row, line) in outcome.values.chunks_exact_mut(SIDE).enumerate() {
-            line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
+        outcome.settled = (owed, changes) == ([0; 2], [0; 2]);
+        outcome.limits = self.bench.store(&mut self.block);
+        if outcome.changed {
+            for (row, line) in outcome.values.chunks_exact_mut(SIDE).enumerate() {
+                line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
+            }
+            self.wakes(field, shared, tile, &mut outcome.wakes);
         }
-        outcome.slack = self.bench.slack;
-        outcome.longest_step = self.bench.longest_step;
-        self.wakes(field, shared, tile, &mut outcome.wakes);
     }
 
     /// The least changed values that could improve a neighbour. A node `x` can be improved by a neighbour `y` only if
@@ -349,7 +384,7 @@ impl Workbench {
             if old - new > ROUNDING * new { new } else { f32::INFINITY }
         };
         let slack = |(dx, dy): (isize, isize)| {
-            neighbour(&field.tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.slack[n])
+            neighbour(&field.tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
         };
         let improves = |new: f32, old: f32, slack: f32| {
             if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }

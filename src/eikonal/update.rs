@@ -115,56 +115,82 @@ impl Coefficients {
     };
 }
 
-/// A tile on the workbench: its values and what the update needs of its tensors, by rows, and by columns when that is asked
-/// for. A sweep updates a whole row at a time, so it carries news across the tile in the directions within 45° of
-/// its own.
+/// Values of a tile and of the nodes around it, row by row, each `(column, row)` from −1 to 16.
+pub(crate) type Block = [[f32; BLOCK]; BLOCK];
+
+/// A set of rows or of columns of a tile, one bit each.
+pub(crate) type Lines = u32;
+
+/// All rows of a tile.
+pub(crate) const ALL: Lines = (1 << SIDE) - 1;
+
+/// What the update needs of `D`, by rows or by columns of a tile, made line by line when first needed.
+#[derive(Debug)]
+struct Prepared {
+    lines: [Coefficients; SIDE],
+    ready: Lines,
+}
+
+impl Default for Prepared {
+    fn default() -> Self {
+        Self { lines: [Coefficients::CLOSED; SIDE], ready: 0 }
+    }
+}
+
+/// A tile on the workbench.
+///
+/// A sweep updates a whole row (or column) at a time, 16 nodes side by side, and carries news across the tile in the
+/// directions within 45° of its own. Lines none of whose neighbours changed are left out.
 #[derive(Debug)]
 pub(crate) struct Bench {
-    transposed: bool,
+    /// Mirrored on the diagonal while sweeps go by columns.
     values: Block,
-    loaded: [bool; 2],
-    coefficients: [[Coefficients; SIDE]; 2],
-    /// By how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
-    /// is above both ends unless the directions to them make an obtuse angle under `M`; then one end `a` may
-    /// exceed it by up to `−aᵀMb/‖b‖`.
-    pub(crate) slack: f32,
-    /// The longest step of any node.
-    pub(crate) longest_step: f32,
+    by_columns: bool,
+    prepared: [Prepared; 2],
+    limits: Limits,
 }
 
 impl Default for Bench {
     fn default() -> Self {
         Self {
-            transposed: false,
             values: [[UNREACHED; BLOCK]; BLOCK],
-            loaded: [false; 2],
-            coefficients: [[Coefficients::CLOSED; SIDE]; 2],
-            slack: 0.0,
-            longest_step: 0.0,
+            by_columns: false,
+            prepared: Default::default(),
+            limits: Limits::default(),
         }
     }
 }
 
-/// Values of a tile and of the nodes around it, row by row, each `(column, row)` from −1 to 16.
-pub(crate) type Block = [[f32; BLOCK]; BLOCK];
+/// What is known of the updated nodes of a tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Limits {
+    /// By how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
+    /// is above both ends unless the directions to them make an obtuse angle under `M`; then it may lie below
+    /// one end `a` by up to `−aᵀMb/‖b‖`.
+    pub(crate) slack: f32,
+    /// The longest step of any node.
+    pub(crate) longest_step: f32,
+}
 
 impl Bench {
     /// Puts a tile on the bench.
     pub(crate) fn load(&mut self, block: &Block) {
-        self.transposed = false;
         self.values = *block;
-        self.loaded = [false; 2];
+        self.by_columns = false;
+        self.prepared.iter_mut().for_each(|side| side.ready = 0);
+        self.limits = Limits::default();
     }
 
     /// Takes the values back off the bench.
-    pub(crate) fn store(&mut self, block: &mut Block) {
+    pub(crate) fn store(&mut self, block: &mut Block) -> Limits {
         self.turn(false);
         *block = self.values;
+        self.limits
     }
 
-    fn turn(&mut self, transposed: bool) {
-        if self.transposed != transposed {
-            self.transposed = transposed;
+    fn turn(&mut self, by_columns: bool) {
+        if self.by_columns != by_columns {
+            self.by_columns = by_columns;
             for row in 0..BLOCK {
                 for col in 0..row {
                     let value = self.values[row][col];
@@ -175,86 +201,109 @@ impl Bench {
         }
     }
 
-    /// One Gauss–Seidel sweep over the rows (`transposed`: columns), from the first to the last or the other way (`descending`).
-    /// Whether any node changed by more than its tolerance, a relative change of `tolerance` of its shortest step.
+    /// One Gauss–Seidel sweep over the rows (or columns) in `dirty`, from the first to the last or the other way
+    /// (`descending`), taking in those that become dirty ahead of it. A change below `tolerance` of a node's shortest step does
+    /// not count.
+    ///
+    /// Returns the rows and the columns next to which something changed: doing either of them again does all.
     pub(crate) fn sweep(
         &mut self,
         tensors: &TensorTile,
         tolerance: f32,
-        transposed: bool,
+        by_columns: bool,
         descending: bool,
-    ) -> bool {
-        self.turn(transposed);
-        let side = usize::from(transposed);
-        if !self.loaded[side] {
-            self.loaded[side] = true;
-            let turned = transposed.then(|| tensors.transposed());
-            let tensors = turned.as_ref().unwrap_or(tensors);
-            (self.slack, self.longest_step) =
-                load(tensors, tolerance, &mut self.coefficients[side]);
-        }
-        sweep(&mut self.values, &self.coefficients[side], descending)
+        dirty: Lines,
+    ) -> [Lines; 2] {
+        self.turn(by_columns);
+        let prepared = &mut self.prepared[usize::from(by_columns)];
+        let how = How { tolerance, by_columns, descending };
+        let mut changed = [0; SIDE];
+        let along = sweep(&mut self.values, prepared, tensors, how, dirty, &mut changed, &mut self.limits);
+        let across = (0..SIDE).fold(0, |set, i| if changed[i] == 0 { set } else { set | around(i) });
+        if by_columns { [across, along] } else { [along, across] }
     }
 }
 
-/// The coefficients of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic tensor would be lost in the rounding of xx·yy − xy².
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn load(
-    tensors: &TensorTile,
+/// How to sweep.
+#[derive(Clone, Copy, Debug)]
+struct How {
     tolerance: f32,
-    coefficients: &mut [Coefficients; SIDE],
-) -> (f32, f32) {
+    by_columns: bool,
+    descending: bool,
+}
+
+/// A line and the ones beside it.
+#[inline(always)]
+fn around(line: usize) -> Lines {
+    ((0b111 << line) >> 1) & ALL
+}
+
+/// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
+/// tensor would be lost in the rounding of xx·yy − xy².
+#[inline(always)]
+fn prepare(tensors: &TensorTile, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
+    let (mut xxs, mut xys, mut dets) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
+    if how.by_columns {
+        for i in 0..SIDE {
+            let place = i * SIDE + line;
+            let (xx, xy, det) = (tensors.xx[place], tensors.xy[place], tensors.det[place]);
+            xys[i] = xy;
+            dets[i] = det;
+            xxs[i] = xx;
+        }
+        for i in 0..SIDE {
+            xxs[i] = (dets[i] + xys[i] * xys[i]) / xxs[i];
+        }
+    } else {
+        xxs = lanes(&tensors.xx, line * SIDE);
+        xys = lanes(&tensors.xy, line * SIDE);
+        dets = lanes(&tensors.det, line * SIDE);
+    }
     let mut slack = [0f32; SIDE];
     let mut longest = [0f32; SIDE];
-    for (row, k) in coefficients.iter_mut().enumerate() {
-        let xx = lanes(&tensors.xx, row * SIDE);
-        let xy = lanes(&tensors.xy, row * SIDE);
-        let det = lanes(&tensors.det, row * SIDE);
-        for i in 0..SIDE {
-            let (xx, xy, det) = (xx[i], xy[i], det[i]);
-            let open = det > 0.0;
-            let ix = 1.0 / xx;
-            let yy = (det + xy * xy) * ix;
-            let (iy, idet) = (1.0 / yy, 1.0 / det);
-            let (east, south) = ((yy * idet).sqrt(), (xx * idet).sqrt());
-            let rising2 = greatest(xx + yy - 2.0 * xy, 1e-30) * idet;
-            let falling2 = greatest(xx + yy + 2.0 * xy, 1e-30) * idet;
-            let (rising, falling) = (rising2.sqrt(), falling2.sqrt());
-            let (irising, ifalling) = (idet / rising, idet / falling);
-            let shortest = least(least(east, south), least(rising, falling));
-            k.ix[i] = choose(open, ix, f32::INFINITY);
-            k.ex[i] = choose(open, det * ix * ix, 0.0);
-            k.bx[i] = choose(open, xy * ix, 0.0);
-            k.iy[i] = choose(open, iy, f32::INFINITY);
-            k.ey[i] = choose(open, det * iy * iy, 0.0);
-            k.by[i] = choose(open, xy * iy, 0.0);
-            k.hx[i] = choose(open, xy * east * iy, 0.0);
-            k.hy[i] = choose(open, xy * south * ix, 0.0);
-            k.rx[i] = choose(open, (xy - xx) * irising, 0.0);
-            k.ry[i] = choose(open, (xy - yy) * irising, 0.0);
-            k.fx[i] = choose(open, -(xx + xy) * ifalling, 0.0);
-            k.fy[i] = choose(open, -(yy + xy) * ifalling, 0.0);
-            k.east[i] = choose(open, east, f32::INFINITY);
-            k.south[i] = choose(open, south, f32::INFINITY);
-            k.rising[i] = choose(open, rising, f32::INFINITY);
-            k.falling[i] = choose(open, falling, f32::INFINITY);
-            k.tolerance[i] = choose(open, tolerance * shortest, f32::INFINITY);
-            let obtuse = greatest(
-                greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
-                greatest(
-                    greatest(-k.rx[i] - rising, -k.ry[i] - rising),
-                    greatest(-k.fx[i] - falling, -k.fy[i] - falling),
-                ),
-            );
-            slack[i] = greatest(slack[i], choose(open, obtuse, 0.0));
-            longest[i] = greatest(longest[i], choose(open, greatest(rising, falling), 0.0));
-        }
+    for i in 0..SIDE {
+        let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
+        let open = det > 0.0;
+        let ix = 1.0 / xx;
+        let yy = (det + xy * xy) * ix;
+        let (iy, idet) = (1.0 / yy, 1.0 / det);
+        let (east, south) = ((yy * idet).sqrt(), (xx * idet).sqrt());
+        let rising2 = greatest(xx + yy - 2.0 * xy, 1e-30) * idet;
+        let falling2 = greatest(xx + yy + 2.0 * xy, 1e-30) * idet;
+        let (rising, falling) = (rising2.sqrt(), falling2.sqrt());
+        let (irising, ifalling) = (idet / rising, idet / falling);
+        let shortest = least(least(east, south), least(rising, falling));
+        k.ix[i] = choose(open, ix, f32::INFINITY);
+        k.ex[i] = choose(open, det * ix * ix, 0.0);
+        k.bx[i] = choose(open, xy * ix, 0.0);
+        k.iy[i] = choose(open, iy, f32::INFINITY);
+        k.ey[i] = choose(open, det * iy * iy, 0.0);
+        k.by[i] = choose(open, xy * iy, 0.0);
+        k.hx[i] = choose(open, xy * east * iy, 0.0);
+        k.hy[i] = choose(open, xy * south * ix, 0.0);
+        k.rx[i] = choose(open, (xy - xx) * irising, 0.0);
+        k.ry[i] = choose(open, (xy - yy) * irising, 0.0);
+        k.fx[i] = choose(open, -(xx + xy) * ifalling, 0.0);
+        k.fy[i] = choose(open, -(yy + xy) * ifalling, 0.0);
+        k.east[i] = choose(open, east, f32::INFINITY);
+        k.south[i] = choose(open, south, f32::INFINITY);
+        k.rising[i] = choose(open, rising, f32::INFINITY);
+        k.falling[i] = choose(open, falling, f32::INFINITY);
+        k.tolerance[i] = choose(open, how.tolerance * shortest, f32::INFINITY);
+        let obtuse = greatest(
+            greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
+            greatest(
+                greatest(-k.rx[i] - rising, -k.ry[i] - rising),
+                greatest(-k.fx[i] - falling, -k.fy[i] - falling),
+            ),
+        );
+        slack[i] = choose(open, obtuse, 0.0);
+        longest[i] = choose(open, greatest(rising, falling), 0.0);
     }
-    (slack.into_iter().fold(0.0, f32::max), longest.into_iter().fold(0.0, f32::max))
+    for i in 0..SIDE {
+        limits.slack = greatest(limits.slack, slack[i]);
+        limits.longest_step = greatest(limits.longest_step, longest[i]);
+    }
 }
 
 #[inline(always)]
@@ -303,17 +352,34 @@ fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn sweep(values: &mut Block, coefficients: &[Coefficients; SIDE], descending: bool) -> bool {
-    let mut changed = [0u32; SIDE];
-    for row in 0..SIDE {
-        let row = if descending { SIDE - 1 - row } else { row };
-        let k = &coefficients[row];
+fn sweep(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tensors: &TensorTile,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    let mut dirty = dirty;
+    for step in 0..SIDE {
+        let row = if how.descending { SIDE - 1 - step } else { step };
+        if dirty & 1 << row == 0 {
+            continue;
+        }
+        dirty &= !(1 << row);
+        let k = &mut prepared.lines[row];
+        if prepared.ready & 1 << row == 0 {
+            prepared.ready |= 1 << row;
+            prepare(tensors, row, how, k, limits);
+        }
         let (above, here, below) = (&values[row], &values[row + 1], &values[row + 2]);
         let (old, east, west) = (lanes(here, 1), lanes(here, 2), lanes(here, 0));
         let (south, north) = (lanes(below, 1), lanes(above, 1));
         let (south_east, north_west) = (lanes(below, 2), lanes(above, 0));
         let (north_east, south_west) = (lanes(above, 2), lanes(below, 0));
         let mut new = [0f32; SIDE];
+        let mut any = 0;
         for i in 0..SIDE {
             let (e, w, s, n) = (east[i], west[i], south[i], north[i]);
             let (se, nw) = (pass(south_east[i], s, e), pass(north_west[i], n, w));
@@ -344,12 +410,17 @@ fn sweep(values: &mut Block, coefficients: &[Coefficients; SIDE], descending: bo
             let u = least(least(rising, falling), edges);
             let floor = ROUNDING * u;
             let significant = greatest(k.tolerance[i], floor);
-            changed[i] |= u32::from(old[i] - u > significant);
+            let news = u32::from(old[i] - u > significant);
+            changed[i] |= news;
+            any |= news;
             new[i] = least(u, old[i]);
         }
         values[row + 1][1..=SIDE].copy_from_slice(&new);
+        if any != 0 {
+            dirty |= around(row);
+        }
     }
-    changed.iter().any(|&c| c != 0)
+    dirty
 }
 
 /// Four units in the last place of an `f32`: changes below are rounding.
