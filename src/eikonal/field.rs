@@ -41,6 +41,11 @@ impl Tiling {
         self.across * self.down
     }
 
+    /// The first node of a tile.
+    pub(crate) fn first(&self, tile: usize) -> DVec2 {
+        DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64
+    }
+
     /// Tile and place in it of a node.
     pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
         ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)

@@ -8,9 +8,10 @@
 //!
 //! Jeong and Whitaker, "A Fast Iterative Method for Eikonal Equations", SIAM J. Sci. Comput. 30 (2008).
 
+use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
-use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, UNREACHED};
+use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Tile, UNREACHED};
 use crate::{Control, Error, Result};
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
@@ -222,6 +223,7 @@ struct Shared {
 /// `done(is_final, values)` is asked between rounds whether what is final is enough.
 pub(super) fn solve(
     field: &TensorField,
+    cones: &Cones,
     values: Values,
     tolerance: f32,
     mut done: impl FnMut(&dyn Fn(usize, usize) -> bool, &Values) -> bool,
@@ -234,7 +236,7 @@ pub(super) fn solve(
     let mut statistics = Statistics::default();
     let shared = Shared { values, queue, taken: Vec::new() };
     let work = |bench: &mut Workbench, shared: &Shared, index: usize, outcome: &mut Outcome| {
-        bench.solve(field, shared, shared.taken[index] as usize, tolerance, outcome);
+        bench.solve(field, cones, shared, shared.taken[index] as usize, tolerance, outcome);
     };
     let lead =
         |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = &Outcome>| -> Result<usize> {
@@ -334,12 +336,14 @@ impl Workbench {
     fn solve(
         &mut self,
         field: &TensorField,
+        cones: &Cones,
         shared: &Shared,
         tile: usize,
         tolerance: f32,
         outcome: &mut Outcome,
     ) {
-        let tensors = &field.tiles[tile];
+        let cone = cones.of_tile(tile).map(|cone| (cone, field.tiling.first(tile)));
+        let input = Tile { tensors: &field.tiles[tile], cone, tolerance };
         shared.values.block(tile, &mut self.block);
         self.bench.load(&self.block);
         // Sweeps run away from the news.
@@ -355,7 +359,7 @@ impl Workbench {
             let side = usize::from(by_columns);
             let dirty = owed[side] | changes[side];
             if dirty != 0 {
-                changes = self.bench.sweep(tensors, tolerance, by_columns, descending[side], dirty);
+                changes = self.bench.sweep(&input, by_columns, descending[side], dirty);
                 owed[side] = 0;
                 outcome.sweeps += 1;
                 outcome.changed |= changes != [0; 2];

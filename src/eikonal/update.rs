@@ -20,6 +20,7 @@
 use glam::DVec2;
 use multiversion::multiversion;
 
+use super::cone::Cone;
 use super::field::{SIDE, TensorTile};
 use crate::Sym2;
 
@@ -128,12 +129,14 @@ pub(crate) const ALL: Lines = (1 << SIDE) - 1;
 #[derive(Debug)]
 struct Prepared {
     lines: [Coefficients; SIDE],
+    /// What to add to each neighbour in the order of [`RING`], if the tile lies in a [`Cone`].
+    shifts: [[[f32; SIDE]; 8]; SIDE],
     ready: Lines,
 }
 
 impl Default for Prepared {
     fn default() -> Self {
-        Self { lines: [Coefficients::CLOSED; SIDE], ready: 0 }
+        Self { lines: [Coefficients::CLOSED; SIDE], shifts: [[[0.0; SIDE]; 8]; SIDE], ready: 0 }
     }
 }
 
@@ -208,26 +211,36 @@ impl Bench {
     /// Returns the rows and the columns next to which something changed: doing either of them again does all.
     pub(crate) fn sweep(
         &mut self,
-        tensors: &TensorTile,
-        tolerance: f32,
+        tile: &Tile<'_>,
         by_columns: bool,
         descending: bool,
         dirty: Lines,
     ) -> [Lines; 2] {
         self.turn(by_columns);
         let prepared = &mut self.prepared[usize::from(by_columns)];
-        let how = How { tolerance, by_columns, descending };
+        let how = How { by_columns, descending };
         let mut changed = [0; SIDE];
-        let along = sweep(&mut self.values, prepared, tensors, how, dirty, &mut changed, &mut self.limits);
-        let across = (0..SIDE).fold(0, |set, i| if changed[i] == 0 { set } else { set | around(i) });
+        let sweep = if tile.cone.is_some() { sweep_in_cone } else { sweep };
+        let along =
+            sweep(&mut self.values, prepared, tile, how, dirty, &mut changed, &mut self.limits);
+        let across =
+            (0..SIDE).fold(0, |set, i| if changed[i] == 0 { set } else { set | around(i) });
         if by_columns { [across, along] } else { [along, across] }
     }
+}
+
+/// What a sweep reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tile<'a> {
+    pub(crate) tensors: &'a TensorTile,
+    /// Cone that the tile lies in, and the tile's first node.
+    pub(crate) cone: Option<(&'a Cone, DVec2)>,
+    pub(crate) tolerance: f32,
 }
 
 /// How to sweep.
 #[derive(Clone, Copy, Debug)]
 struct How {
-    tolerance: f32,
     by_columns: bool,
     descending: bool,
 }
@@ -241,7 +254,8 @@ fn around(line: usize) -> Lines {
 /// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
 /// tensor would be lost in the rounding of xx·yy − xy².
 #[inline(always)]
-fn prepare(tensors: &TensorTile, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
+fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
+    let tensors = tile.tensors;
     let (mut xxs, mut xys, mut dets) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     if how.by_columns {
         for i in 0..SIDE {
@@ -289,7 +303,7 @@ fn prepare(tensors: &TensorTile, line: usize, how: How, k: &mut Coefficients, li
         k.south[i] = choose(open, south, f32::INFINITY);
         k.rising[i] = choose(open, rising, f32::INFINITY);
         k.falling[i] = choose(open, falling, f32::INFINITY);
-        k.tolerance[i] = choose(open, how.tolerance * shortest, f32::INFINITY);
+        k.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
         let obtuse = greatest(
             greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
             greatest(
@@ -346,6 +360,36 @@ fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
     a + (beta * d + greatest(root, 0.0).sqrt())
 }
 
+/// [`Cone::shift`] for the nodes of one line.
+#[inline(always)]
+fn prepare_shifts(tile: &Tile<'_>, line: usize, how: How, shifts: &mut [[f32; SIDE]; 8]) {
+    let Some((cone, first)) = tile.cone else { return };
+    let turn = |v: DVec2| if how.by_columns { DVec2::new(v.y, v.x) } else { v };
+    let from = turn(first - cone.at);
+    let (m, sides) = (cone.metric, cone.sides.map(turn));
+    let m = if how.by_columns { Sym2::new(m.yy, m.xy, m.xx) } else { m };
+    let [p, q] = sides.map(|side| m.apply(side));
+    let (xx, xy, yy) = (m.xx as f32, m.xy as f32, m.yy as f32);
+    let (px, py, qx, qy) = (p.x as f32, p.y as f32, q.x as f32, q.y as f32);
+    let (x0, y) = (from.x as f32, (from.y + line as f64) as f32);
+    for i in 0..SIDE {
+        let x = x0 + i as f32;
+        let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
+        let g2 = greatest(mx * x + my * y, 0.0);
+        let g = g2.sqrt();
+        let holds = (px * x + py * y <= 0.0) & (qx * x + qy * y <= 0.0) & (g > 0.0);
+        let share = choose(holds, 1.0 / g, 0.0);
+        for k in 0..8 {
+            let (dx, dy) = (RING[k].0 as f32, RING[k].1 as f32);
+            let a = mx * dx + my * dy;
+            let b = xx * (dx * dx) + 2.0 * xy * (dx * dy) + yy * (dy * dy);
+            let sum = g + greatest(g2 + (2.0 * a + b), 0.0).sqrt();
+            let isum = 1.0 / sum;
+            shifts[k][i] = choose(holds, (a * (2.0 * a + b) * isum - g * b) * (isum * share), 0.0);
+        }
+    }
+}
+
 /// See [`Bench::sweep`]. No fused multiply-add, so every instruction set gives the same bits.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
@@ -355,7 +399,38 @@ fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
 fn sweep(
     values: &mut Block,
     prepared: &mut Prepared,
-    tensors: &TensorTile,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    sweep_lines::<false>(values, prepared, tile, how, dirty, changed, limits)
+}
+
+/// The same in a tile that lies in a [`Cone`].
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn sweep_in_cone(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    sweep_lines::<true>(values, prepared, tile, how, dirty, changed, limits)
+}
+
+#[inline(always)]
+fn sweep_lines<const IN_CONE: bool>(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
     how: How,
     dirty: Lines,
     changed: &mut [u32; SIDE],
@@ -371,19 +446,29 @@ fn sweep(
         let k = &mut prepared.lines[row];
         if prepared.ready & 1 << row == 0 {
             prepared.ready |= 1 << row;
-            prepare(tensors, row, how, k, limits);
+            prepare(tile, row, how, k, limits);
+            if IN_CONE {
+                prepare_shifts(tile, row, how, &mut prepared.shifts[row]);
+            }
         }
         let (above, here, below) = (&values[row], &values[row + 1], &values[row + 2]);
         let (old, east, west) = (lanes(here, 1), lanes(here, 2), lanes(here, 0));
         let (south, north) = (lanes(below, 1), lanes(above, 1));
         let (south_east, north_west) = (lanes(below, 2), lanes(above, 0));
         let (north_east, south_west) = (lanes(above, 2), lanes(below, 0));
+        let shifts = &prepared.shifts[row];
         let mut new = [0f32; SIDE];
         let mut any = 0;
         for i in 0..SIDE {
-            let (e, w, s, n) = (east[i], west[i], south[i], north[i]);
-            let (se, nw) = (pass(south_east[i], s, e), pass(north_west[i], n, w));
-            let (ne, sw) = (pass(north_east[i], n, e), pass(south_west[i], s, w));
+            let (mut e, mut w, mut s, mut n) = (east[i], west[i], south[i], north[i]);
+            let (mut se, mut nw) = (pass(south_east[i], s, e), pass(north_west[i], n, w));
+            let (mut ne, mut sw) = (pass(north_east[i], n, e), pass(south_west[i], s, w));
+            if IN_CONE {
+                (e, se, s, sw) =
+                    (e + shifts[0][i], se + shifts[1][i], s + shifts[2][i], sw + shifts[3][i]);
+                (w, nw, n, ne) =
+                    (w + shifts[4][i], nw + shifts[5][i], n + shifts[6][i], ne + shifts[7][i]);
+            }
             let edges = least(
                 least(least(e, w) + k.east[i], least(s, n) + k.south[i]),
                 least(least(se, nw) + k.rising[i], least(ne, sw) + k.falling[i]),
