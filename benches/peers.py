@@ -245,7 +245,7 @@ def side_by_side(solvers, problem, n, repeat):
     print(f"With making the tensors before and a row-major array after, ms: {whole}.\n")
 
 
-GOALS = (1e-3, 1e-4, 1e-5)
+GOALS = (1e-3, 1e-4, 1e-5, 1e-6)
 
 
 def time_to_accuracy(solvers, problem, sizes, repeat):
@@ -268,6 +268,34 @@ def time_to(goal, results):
             share = np.log(coarse["mean"] / goal) / np.log(coarse["mean"] / fine["mean"])
             return milliseconds(coarse["seconds"] ** (1 - share) * fine["seconds"] ** share)
     return f"> {milliseconds(results[-1]['seconds'])}"
+
+
+def alone(program, problems, accuracies, n, *options):
+    """Ridgeway on problems that no peer can do, on one thread and two in turn."""
+    print(f"### {n}² nodes\n")
+    command = [program, f"--problem={problems}", f"--size={n}", f"--accuracy={accuracies}", "--threads=1,2", *options]
+    rows = []
+
+    def per_node(seconds):
+        return f"{1e9 * seconds / n**2:.1f}"
+
+    for line in subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout.splitlines():
+        report = json.loads(line)
+        one, two = report["runs"]
+        speedups = [a / b for a, b in zip(one["solve_s"], two["solve_s"])]
+        error = report["error"]
+        rows.append(
+            [
+                f"{report['problem']}, {report['accuracy']}",
+                *(f"{per_node(median(run['solve_s']))} ({per_node(min(run['solve_s']))})" for run in (one, two)),
+                f"{median(speedups):.2f} of {median(two['spin_speedup']):.2f}",
+                f"{report['passes_per_node']:.1f}",
+                f"{report['activations_per_tile']:.1f}",
+                f"{error['mean_relative']:.1e} / {error['max_relative']:.1e} ({error['against']})" if error else "",
+            ]
+        )
+    head = ["problem", "ns/node on 1 thread (least)", "on 2 threads (least)", "speed-up, of a spin loop's"]
+    table(head + ["passes/node", "activations/tile", "mean / max error"], rows)
 
 
 def calibration():
@@ -321,6 +349,11 @@ def main():
     side_by_side(ours | {"fim-python": fim_python}, "constant-25", 201, min(args.repeat, 3))
     for problem in ("constant-25", "constant-100", "constant-400", "diffeomorphism", "cylinder", "sphere-cap"):
         time_to_accuracy(one_thread, problem, sizes, min(args.repeat, 3))
+    print("## Easy and hard, ridgeway alone\n")
+    repeat = f"--repeat={args.repeat}"
+    hard = "constant-1,hills,constant-400,rotating,random-speed,maze,spiral"
+    alone(program, hard, args.accuracies, args.size, repeat, "--finer=4")
+    alone(program, "constant-1,constant-25", args.accuracies, 4 * args.size - 3, repeat)
     print(calibration())
 
 

@@ -16,7 +16,7 @@ use ridgeway::{
     Modifiers, Result, Smoothing, Solver, StartRegion, Sym2, Terrain,
 };
 
-/// Names of the accuracies there are, see [`solver`].
+/// Names of the accuracies there are, the best last, see [`solver`].
 pub(crate) const ACCURACIES: [&str; 1] = ["fast"];
 
 /// The solver of an accuracy; `None` if there is no such.

@@ -43,7 +43,7 @@ struct Args {
     /// Solves per number of threads that are timed, after one that is not
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..))]
     repeat: u16,
-    /// Without a closed form and walls, compare with our solution at so many times the resolution
+    /// Without a closed form and walls, compare with our most accurate solution at so many times the resolution
     #[arg(long, value_parser = clap::value_parser!(u32).range(2..=16))]
     finer: Option<u32>,
     /// Write the distances of the last solve: f32, little-endian, row by row
@@ -148,25 +148,6 @@ fn measure<'a>(
         std::fs::write(path, values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())?;
     }
     let statistics = map.statistics();
-    let error = match (exact::exact(problem), args.finer) {
-        (Some(exact), _) => {
-            let at = |node: DVec2| node / (n - 1) as f64 - DVec2::splat(0.5);
-            Some(compare(&map, "closed form", |col, row| {
-                exact(at(DVec2::new(col as f64, row as f64)))
-            }))
-        }
-        (None, Some(times)) if !has_walls(problem) => {
-            let times = times as usize;
-            let fine = times * (n - 1) + 1;
-            let field = problem.field(fine, &control)?;
-            let fine = solver.solve_field(field, &Problem::start(fine), &[], &control)?;
-            let value = |col: usize, row: usize| fine.at_node(times * col, times * row);
-            Some(compare(&map, "finer grid", |col, row| {
-                Some(value(col, row)).filter(|value| value.is_finite())
-            }))
-        }
-        _ => None,
-    };
     let tiles = statistics.tiles.max(1) as f64;
     Ok(Report {
         problem: problem.to_string(),
@@ -175,13 +156,33 @@ fn measure<'a>(
         runs,
         activations_per_tile: statistics.activations as f64 / tiles,
         passes_per_node: statistics.sweeps as f64 / tiles,
-        error,
+        error: judge(problem, &map, args.finer)?,
     })
 }
 
-/// Walls are a few nodes thick, so that another size is another problem.
-fn has_walls(problem: Problem) -> bool {
-    matches!(problem, Problem::Maze | Problem::Spiral)
+/// The error of a map, where there is something to judge it by.
+fn judge(
+    problem: Problem,
+    map: &DistanceMap,
+    finer: Option<u32>,
+) -> Result<Option<Error>, Failure> {
+    let n = map.cols();
+    if let Some(exact) = exact::exact(problem) {
+        let at = |col: usize, row: usize| DVec2::new(col as f64, row as f64) / (n - 1) as f64;
+        let exact = |col, row| exact(at(col, row) - DVec2::splat(0.5));
+        return Ok(Some(compare(map, "closed form", exact)));
+    }
+    // Walls are a few nodes thick, so that another size is another problem.
+    let has_walls = matches!(problem, Problem::Maze | Problem::Spiral);
+    let Some(times) = finer.filter(|_| !has_walls) else { return Ok(None) };
+    let (times, control) = (times as usize, Control::default());
+    let fine = times * (n - 1) + 1;
+    let best = solver(ACCURACIES[ACCURACIES.len() - 1]).ok_or("no such accuracy")?;
+    let field = problem.field(fine, &control)?;
+    let fine = best.solve_field(field, &Problem::start(fine), &[], &control)?;
+    let value = |col: usize, row: usize| fine.at_node(times * col, times * row);
+    let reached = |col, row| Some(value(col, row)).filter(|value| value.is_finite());
+    Ok(Some(compare(map, "finer grid", reached)))
 }
 
 fn compare(
