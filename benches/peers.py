@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Runs ridgeway's solver beside the eikonal solvers that Python users install, and prints Markdown tables.
 
     python3 -m venv /tmp/peers
@@ -12,9 +11,10 @@ has none, and is judged by eikonalfm's own answer at three times the resolution,
 speed a factored solver is exact by construction: linear-speed and random-speed tell more. scikit-fmm gets the source as
 a zero of phi at one node; from a circle of a tenth of the side its mean error is some five times smaller.
 
-scikit-fmm, eikonalfm and scikit-image know isotropic speeds only. Of the anisotropic solvers only fim-python has a wheel
-that runs on a CPU: a mesh solver in NumPy, which is shown at the few nodes that it can do in seconds. Hamiltonian fast
-marching, the best of them, is C++ to be built from source; the wheel of its Python front, agd, holds no CPU solver.
+scikit-fmm, eikonalfm and scikit-image know isotropic speeds only. The anisotropic solvers that are wheels and run on a
+CPU, fim-python and eikonax, work on meshes of triangles; fim-python, in NumPy, is shown at the few nodes that it can
+do in seconds, eikonax needs JAX and is left out. Hamiltonian fast marching, the best of them all, is C++ to be built
+from source: the wheel of its Python front, agd, has solvers for a GPU and asks for that program on a CPU.
 """
 
 import os
@@ -32,6 +32,7 @@ from contextlib import redirect_stdout
 from functools import lru_cache
 from importlib.metadata import version
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from tempfile import NamedTemporaryFile
@@ -263,7 +264,7 @@ def time_to(goal, results):
     """Interpolated by powers between two sizes; not extrapolated."""
     if results[0]["mean"] <= goal:
         return f"< {milliseconds(results[0]['seconds'])}"
-    for coarse, fine in zip(results, results[1:]):
+    for coarse, fine in pairwise(results):
         if fine["mean"] <= goal:
             share = np.log(coarse["mean"] / goal) / np.log(coarse["mean"] / fine["mean"])
             return milliseconds(coarse["seconds"] ** (1 - share) * fine["seconds"] ** share)
