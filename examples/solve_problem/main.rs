@@ -97,6 +97,7 @@ struct Run {
 /// Relative errors over the nodes more than three cells from the source.
 #[derive(Serialize)]
 struct Error {
+    /// `closed form`, or `finer grid`: then the error of that is in the figures too.
     against: &'static str,
     mean_relative: f64,
     max_relative: f64,
