@@ -76,3 +76,28 @@ fn accuracy_is_what_the_documentation_says() {
         assert!(most.parse::<f64>().expect(most) < 1.5, "{row}");
     }
 }
+
+#[test]
+fn the_problems_are_solved_to_first_order() {
+    // Largest mean error at 201² nodes; the ways of the others have no closed form.
+    let known = [
+        ("constant-1", 4e-3),
+        ("constant-25", 9e-3),
+        ("diffeomorphism", 9e-3),
+        ("linear-speed", 4e-3),
+        ("cylinder", 5e-3),
+        ("sphere-cap", 5e-3),
+    ];
+    let unknown = ["hills", "random-speed", "rotating", "maze", "spiral"];
+    let names: Vec<_> = known.iter().map(|(name, _)| *name).chain(unknown).collect();
+    let names = names.join(",");
+    let printed = run("solve_problem", &["--problem", &names, "--size", "201", "--repeat", "1"]);
+    let reports: Vec<serde_json::Value> =
+        printed.lines().map(|line| serde_json::from_str(line).expect(line)).collect();
+    assert_eq!(reports.len(), known.len() + unknown.len(), "{printed}");
+    for (report, (name, most)) in reports.iter().zip(known) {
+        let error = &report["error"];
+        assert!(report["problem"] == name && error["unreached"] == 0, "{report}");
+        assert!(error["mean_relative"].as_f64().is_some_and(|mean| mean < most), "{report}");
+    }
+}

@@ -45,6 +45,11 @@ impl Tiling {
         self.across * self.down
     }
 
+    /// The first node of a tile.
+    pub(crate) fn first(&self, tile: usize) -> DVec2 {
+        DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64
+    }
+
     /// Tile and place in it of a node.
     pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
         ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)
@@ -59,8 +64,6 @@ pub struct TensorField {
     pub(super) tiles: Vec<TensorTile>,
     /// `D = scale · stored`, so distance is stored distance divided by [`root_scale`](Self::root_scale).
     root_scale: f64,
-    /// Longest step to a neighbour in each tile, in stored units; 0 where all is closed.
-    pub(super) longest_step: Vec<f32>,
     /// Mean over the open nodes of the length of a cell, `det(D)^(−1/4)`, in stored units.
     pub(super) mean_step: f32,
 }
@@ -114,28 +117,27 @@ impl TensorField {
     ) -> Result<Self> {
         let tiling = Tiling::new(cols, rows);
         let root_scale = typical_speed(tiling, stretch, &sample);
-        let (mut tiles, mut steps) = (Vec::new(), Vec::new());
+        let (mut tiles, mut cells) = (Vec::new(), Vec::new());
         (0..tiling.tiles())
             .into_par_iter()
             .with_min_len(tiling.across)
             .map_init(SpeedBlock::default, |speeds, i| {
                 let mut tile = TensorTile::CLOSED;
                 if control.cancel.is_cancelled() {
-                    return (tile, Steps::default());
+                    return (tile, Cells::default());
                 }
                 let (col, row) = ((i % tiling.across) * SIDE, (i / tiling.across) * SIDE);
                 sample(col, row, speeds);
-                let steps = store(speeds, &stretch[row..], root_scale.recip(), &mut tile);
-                (tile, steps)
+                let cells = store(speeds, &stretch[row..], root_scale.recip(), &mut tile);
+                (tile, cells)
             })
-            .unzip_into_vecs(&mut tiles, &mut steps);
+            .unzip_into_vecs(&mut tiles, &mut cells);
         control.check()?;
-        let (sum, count) = steps.iter().fold((0.0, 0), |(sum, count), steps| {
-            (sum + f64::from(steps.sum), count + steps.count as usize)
+        let (sum, count) = cells.iter().fold((0.0, 0), |(sum, count), cells| {
+            (sum + f64::from(cells.lengths), count + cells.count as usize)
         });
         let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
-        let longest_step = steps.iter().map(|steps| steps.longest).collect();
-        Ok(Self { tiling, tiles, root_scale, longest_step, mean_step: mean_step as f32 })
+        Ok(Self { tiling, tiles, root_scale, mean_step: mean_step as f32 })
     }
 
     /// Columns of the grid.
@@ -199,13 +201,11 @@ impl TensorField {
     }
 }
 
-/// What is known of the steps in a tile, in stored units.
+/// The open cells of a tile.
 #[derive(Clone, Copy, Debug, Default)]
-struct Steps {
-    /// The longest to a neighbour from an open node.
-    longest: f32,
-    /// Sum of the lengths of the open cells, and their number.
-    sum: f32,
+struct Cells {
+    /// Sum of their lengths `det(D)^(−1/4)`, in stored units.
+    lengths: f32,
     count: u32,
 }
 
@@ -242,9 +242,8 @@ fn typical_speed(
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorTile) -> Steps {
-    let mut longest = [0f32; SIDE];
-    let mut sums = [0f32; SIDE];
+fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorTile) -> Cells {
+    let mut lengths = [0f32; SIDE];
     let mut counts = [0u32; SIDE];
     for (row, by) in stretch.iter().take(SIDE).enumerate() {
         let (x, y) = (by.x * shrink, by.y * shrink);
@@ -257,22 +256,12 @@ fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorT
             tile.xx[place] = if fits { xx as f32 } else { 0.0 };
             tile.xy[place] = if fits { xy as f32 } else { 0.0 };
             tile.det[place] = if fits { det as f32 } else { 0.0 };
-            // The squares of the steps (1,1) and (1,−1) are (xx + yy ∓ 2xy)/det; those of (1,0) and (0,1) are less
-            // than the larger of them.
-            let det = det as f32;
-            let squared = (xx + yy + 2.0 * xy.abs()) as f32 / det;
-            let squared = if fits { squared } else { 0.0 };
-            longest[i] = if squared > longest[i] { squared } else { longest[i] };
-            // A cell is as long as 1/√speed: det^(−1/4).
-            sums[i] += if fits { (1.0 / det).sqrt().sqrt() } else { 0.0 };
+            let length = (1.0 / det as f32).sqrt().sqrt();
+            lengths[i] += if fits { length } else { 0.0 };
             counts[i] += u32::from(fits);
         }
     }
-    Steps {
-        longest: longest.into_iter().fold(0.0, f32::max).sqrt(),
-        sum: sums.iter().sum(),
-        count: counts.iter().sum(),
-    }
+    Cells { lengths: lengths.iter().sum(), count: counts.iter().sum() }
 }
 
 /// Whether a number, and the numbers it is multiplied with, keep within the range of `f32`.

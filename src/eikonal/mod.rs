@@ -8,6 +8,8 @@
 //! node. [`mod@reference`] is the slow judge.
 
 mod cell;
+mod cone;
+mod crew;
 mod field;
 pub mod reference;
 mod source;
@@ -16,6 +18,7 @@ mod update;
 
 use glam::DVec2;
 
+use self::cone::Cones;
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
 #[cfg(test)]
@@ -70,7 +73,8 @@ impl Solver {
         goals: &[DVec2],
         control: &Control,
     ) -> Result<DistanceMap> {
-        let mut values = Values::unreached(field.tiling);
+        let cones = Cones::new(&field, start);
+        let mut values = Values::unreached(&field);
         let mut seeds = 0;
         start.seed(&field, |col, row, value| {
             values.lower(col, row, value as f32);
@@ -82,28 +86,38 @@ impl Solver {
                  is too extreme to compute with, as around heights that no terrain has",
             ));
         }
-        let settled = |limit: f32, values: &Values| {
-            !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, values, goal, limit))
+        let done = |is_final: &dyn Fn(usize, usize) -> bool, _: &Values| {
+            !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, goal, is_final))
         };
-        let statistics = tiles::solve(&field, &mut values, self.tolerance, settled, control)?;
-        Ok(DistanceMap { field, values, start: start.clone(), statistics, unit: "", frame: None })
+        let (values, statistics) =
+            tiles::solve(&field, &cones, values, self.tolerance, done, control)?;
+        Ok(DistanceMap {
+            field,
+            cones,
+            values,
+            start: start.clone(),
+            statistics,
+            unit: "",
+            frame: None,
+        })
     }
 }
 
-/// Whether the open corners of the goal's cell have values that no news from `limit` on can change.
-fn is_settled(field: &TensorField, values: &Values, goal: DVec2, limit: f32) -> bool {
+/// Whether the open corners of the goal's cell have final values.
+fn is_settled(field: &TensorField, goal: DVec2, is_final: &dyn Fn(usize, usize) -> bool) -> bool {
     let (col, row) = (goal.x.max(0.0) as usize, goal.y.max(0.0) as usize);
     let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (col + i, row + j));
     corners
         .into_iter()
         .filter(|&(c, r)| c < field.cols() && r < field.rows() && field.is_open(c, r))
-        .all(|(c, r)| values.get(c, r) + field.longest_step[field.tiling.place(c, r).0] < limit)
+        .all(|(c, r)| is_final(c, r))
 }
 
 /// Distance from the start region at every node.
 #[derive(Clone, Debug)]
 pub struct DistanceMap {
     pub(crate) field: TensorField,
+    cones: Cones,
     values: Values,
     pub(crate) start: StartRegion,
     statistics: Statistics,
@@ -185,7 +199,7 @@ impl DistanceMap {
         if let Some(foot) = self.straight_home(node, self.stored(col, row)) {
             return Some(foot - node);
         }
-        best_foot(&self.field, &self.values, col, row).map(|(_, foot)| foot)
+        best_foot(&self.field, &self.cones, &self.values, col, row).map(|(_, foot)| foot)
     }
 
     /// The point of the start region to go to straight from `at`, if that is the shortest way.
@@ -238,15 +252,22 @@ impl DistanceMap {
 const SEED_SIGHT: f64 = 4.0;
 
 /// Least value of a node over its ring, with the step to the point of the ring it came from.
-fn best_foot(field: &TensorField, values: &Values, col: usize, row: usize) -> Option<(f64, DVec2)> {
+fn best_foot(
+    field: &TensorField,
+    cones: &Cones,
+    values: &Values,
+    col: usize,
+    row: usize,
+) -> Option<(f64, DVec2)> {
     let metric = field.metric(col, row)?;
     let ring = RING.map(|(i, j)| {
         let (c, r) = (col.checked_add_signed(i as isize), row.checked_add_signed(j as isize));
         match (c, r) {
             (Some(c), Some(r)) if c < field.cols() && r < field.rows() => values.get(c, r),
-            _ => UNREACHED,
+            _ => f32::INFINITY,
         }
     });
+    let shifts = cones.shifts(&field.tiling, col, row);
     let mut best: Option<(f64, DVec2)> = None;
     let mut offer = |value: f64, foot: DVec2| {
         if best.is_none_or(|(least, _)| value < least) {
@@ -257,16 +278,16 @@ fn best_foot(field: &TensorField, values: &Values, col: usize, row: usize) -> Op
     for axis in (0..8).step_by(2) {
         for diagonal in [(axis + 1) % 8, (axis + 7) % 8] {
             let (a, b) = (ring[axis], ring[diagonal]);
+            let (ga, gb) = (f64::from(a) + shifts[axis], f64::from(b) + shifts[diagonal]);
             match (a < UNREACHED, b < UNREACHED) {
                 (true, true) => {
-                    let (a, b) = (f64::from(a), f64::from(b));
-                    let (value, theta) = segment(a, place(axis), b, place(diagonal), metric);
+                    let (value, theta) = segment(ga, place(axis), gb, place(diagonal), metric);
                     offer(value, place(axis).lerp(place(diagonal), theta));
                 }
-                (true, false) => offer(f64::from(a) + metric.norm(place(axis)), place(axis)),
-                // Past a reached axis neighbour on the other side; between two walls there is no way.
-                (false, true) if ring[(2 * diagonal + 8 - axis) % 8] < UNREACHED => {
-                    offer(f64::from(b) + metric.norm(place(diagonal)), place(diagonal));
+                (true, false) => offer(ga + metric.norm(place(axis)), place(axis)),
+                // Past an axis neighbour, on this side or the other; between two walls there is no way.
+                (false, true) if a.min(ring[(2 * diagonal + 8 - axis) % 8]) < f32::INFINITY => {
+                    offer(gb + metric.norm(place(diagonal)), place(diagonal));
                 }
                 _ => {}
             }

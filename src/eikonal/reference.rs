@@ -1,9 +1,9 @@
 //! The slow and obviously right solver: judge of the tests.
 
+use super::cone::Cones;
 use super::field::TensorField;
 use super::source::StartRegion;
 use super::tiles::Values;
-use super::update::UNREACHED;
 use super::{DistanceMap, Statistics, best_foot};
 use crate::{Control, Result};
 
@@ -13,7 +13,8 @@ use crate::{Control, Result};
 /// # Errors
 /// Cancelled.
 pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Result<DistanceMap> {
-    let mut values = Values::unreached(field.tiling);
+    let cones = Cones::new(&field, start);
+    let mut values = Values::unreached(&field);
     start.seed(&field, |col, row, value| values.lower(col, row, value as f32));
     let (cols, rows) = (field.cols(), field.rows());
     let mut changed = true;
@@ -26,7 +27,8 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
             for i in 0..cols {
                 let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
                 let old = values.get(col, row);
-                let new = best_foot(&field, &values, col, row).map_or(UNREACHED, |(g, _)| g as f32);
+                let new = best_foot(&field, &cones, &values, col, row)
+                    .map_or(f32::INFINITY, |(g, _)| g as f32);
                 if new < old {
                     values.lower(col, row, new);
                     changed = true;
@@ -36,5 +38,13 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
         sweep += 1;
     }
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
-    Ok(DistanceMap { field, values, start: start.clone(), statistics, unit: "", frame: None })
+    Ok(DistanceMap {
+        field,
+        cones,
+        values,
+        start: start.clone(),
+        statistics,
+        unit: "",
+        frame: None,
+    })
 }

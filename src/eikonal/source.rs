@@ -23,10 +23,9 @@ impl From<DVec2> for StartRegion {
     }
 }
 
-/// Around a point, nodes this near get the length of the straight step to it. Near a point source the distance is a
-/// cone, on which the update is only first order with a large constant; a ball of fixed size in cells costs
-/// nothing in order and is safe on any metric (a larger one is not where the metric varies).
-const POINT_RADIUS: f64 = 5.0;
+/// Around a point, nodes this near get the length of the geodesic to it, of second order, see [`geodesic`]. A ball of a
+/// fixed size in cells is safe on any metric.
+const POINT_RADIUS: f64 = 4.0;
 /// Around a line or the border of an area: enough that every triangle next to it has values.
 const LINE_RADIUS: f64 = 1.5;
 
@@ -54,7 +53,7 @@ impl StartRegion {
     pub(super) fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
         for &point in &self.points {
             near(field, point, point, POINT_RADIUS, |col, row, node| {
-                if let Some(length) = straight(field, node, point) {
+                if let Some(length) = geodesic(field, node, point) {
                     set(col, row, length);
                 }
             });
@@ -72,6 +71,24 @@ impl StartRegion {
         for rings in &self.areas {
             inside(field, rings, |col, row| set(col, row, 0.0));
         }
+    }
+
+    /// The points that geodesics fan out from, each with the directions of the sides that end there.
+    pub(super) fn corners(&self) -> impl Iterator<Item = (DVec2, [DVec2; 2])> + '_ {
+        let points = self.points.iter().map(|&point| (point, [DVec2::ZERO; 2]));
+        let lines = self.lines.iter().flat_map(|line| {
+            let side = |from: usize, to: Option<usize>| {
+                to.and_then(|to| line.get(to)).map_or(DVec2::ZERO, |&to| to - line[from])
+            };
+            (0..line.len())
+                .map(move |i| (line[i], [side(i, i.checked_sub(1)), side(i, Some(i + 1))]))
+        });
+        let rings = self.areas.iter().flatten().filter(|ring| !ring.is_empty()).flat_map(|ring| {
+            let count = ring.len();
+            let side = move |from: usize, to: usize| ring[to % count] - ring[from];
+            (0..count).map(move |i| (ring[i], [side(i, i + count - 1), side(i, i + 1)]))
+        });
+        points.chain(lines).chain(rings)
     }
 
     /// Segments of the lines and of the borders of the areas.
@@ -167,6 +184,35 @@ fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
         sum += weight / 12.0 * field.metric_at(a + by * (i as f64 / 4.0))?.norm(by);
     }
     Some(sum)
+}
+
+/// Length of the geodesic between two points nearby in stored units: `d² = E − B` up to fourth order in the distance,
+/// with the energy `E = ∫ vᵀMv` of the chord `v` and what bending saves, `B = ‖Γ(v, v)‖²_D/12` by the Christoffel
+/// symbols at its middle. `None` where a wall is in the way.
+fn geodesic(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
+    /// The expansion is no good where bending would save more than this share.
+    const MOST: f64 = 0.2;
+    if !sees(field, a, b) {
+        return None;
+    }
+    let v = b - a;
+    let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
+    let mut energy = 0.0;
+    for (i, weight) in weights.into_iter().enumerate() {
+        energy += weight / 12.0 * field.metric_at(a + v * (i as f64 / 4.0))?.form(v);
+    }
+    let middle = a.midpoint(b);
+    let last = DVec2::new((field.cols() - 1) as f64, (field.rows() - 1) as f64);
+    let slope = |by: DVec2| {
+        let (before, after) =
+            ((middle - by).clamp(DVec2::ZERO, last), (middle + by).clamp(DVec2::ZERO, last));
+        let length = (after - before).length().max(f64::MIN_POSITIVE);
+        Some((field.metric_at(after)? + field.metric_at(before)? * -1.0) * length.recip())
+    };
+    let (mx, my) = (slope(DVec2::X)?, slope(DVec2::Y)?);
+    let bend = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
+    let saved = field.metric_at(middle)?.inverse().form(bend) / 12.0;
+    Some((energy - saved.min(MOST * energy)).sqrt())
 }
 
 /// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones.

@@ -1,20 +1,20 @@
 //! The Fast Iterative Method over tiles: which tile is solved when.
 //!
-//! A tile is solved by Gauss–Seidel sweeps until it stands still, then wakes the neighbours that could improve
-//! by it, each with a *key*: the least changed value it can see. Tiles are taken in rounds in order of key,
+//! A tile is solved by Gauss–Seidel sweeps until it stands still, then wakes the neighbours that it could improve,
+//! each with a *key*: the least changed value that matters there. Tiles are taken in rounds in order of key,
 //! which makes the method nearly label-setting; in order of arrival it would solve whole regions again
 //! each time a later, shorter front arrives. A round is a set of tiles no two of which touch, so they can be solved
 //! at the same time and the outcome does not depend on who solves which.
 //!
 //! Jeong and Whitaker, "A Fast Iterative Method for Eikonal Equations", SIAM J. Sci. Comput. 30 (2008).
 
-use rayon::prelude::*;
-
+use super::cone::Cones;
+use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
-use super::update::{Bench, Block, ROUNDING, UNREACHED};
+use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Tile, UNREACHED};
 use crate::{Control, Error, Result};
 
-/// Values at the nodes, tile by tile, in the field's stored units.
+/// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
 #[derive(Clone, Debug)]
 pub(crate) struct Values {
     pub(crate) tiling: Tiling,
@@ -22,8 +22,11 @@ pub(crate) struct Values {
 }
 
 impl Values {
-    pub(crate) fn unreached(tiling: Tiling) -> Self {
-        Self { tiling, tiles: vec![[UNREACHED; AREA]; tiling.tiles()] }
+    pub(crate) fn unreached(field: &TensorField) -> Self {
+        let fill = |tensors: &super::field::TensorTile| {
+            tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY })
+        };
+        Self { tiling: field.tiling, tiles: field.tiles.iter().map(fill).collect() }
     }
 
     pub(crate) fn get(&self, col: usize, row: usize) -> f32 {
@@ -37,7 +40,7 @@ impl Values {
         *old = old.min(value);
     }
 
-    /// A tile and the nodes around it.
+    /// A tile and the nodes around it; infinite outside the grid.
     fn block(&self, tile: usize, block: &mut Block) {
         let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
         for (j, line) in block.iter_mut().enumerate() {
@@ -45,14 +48,15 @@ impl Values {
             let row = ty * SIDE + SIDE + j - 1;
             let (ny, y) = (row / SIDE, row % SIDE);
             if ny == 0 || ny > self.tiling.down {
-                *line = [UNREACHED; SIDE + 2];
+                *line = [f32::INFINITY; SIDE + 2];
                 continue;
             }
             let base = (ny - 1) * self.tiling.across;
             let at = |nx: usize, x: usize| self.tiles[base + nx][y * SIDE + x];
-            line[0] = if tx > 0 { at(tx - 1, SIDE - 1) } else { UNREACHED };
+            line[0] = if tx > 0 { at(tx - 1, SIDE - 1) } else { f32::INFINITY };
             line[1..=SIDE].copy_from_slice(&self.tiles[base + tx][y * SIDE..][..SIDE]);
-            line[SIDE + 1] = if tx + 1 < self.tiling.across { at(tx + 1, 0) } else { UNREACHED };
+            line[SIDE + 1] =
+                if tx + 1 < self.tiling.across { at(tx + 1, 0) } else { f32::INFINITY };
         }
     }
 }
@@ -71,30 +75,52 @@ pub struct Statistics {
 }
 
 /// What solving a tile brought.
+#[derive(Clone, Debug)]
 struct Outcome {
-    tile: u32,
     values: [f32; AREA],
-    /// Least changed value that each neighbour sees, see [`NEIGHBOURS`].
+    /// For each of [`NEIGHBOURS`] the least changed value that could improve it; infinite if none.
     wakes: [f32; 8],
+    limits: Limits,
     sweeps: usize,
+    /// Whether the tile changed, and whether it stands still.
+    changed: bool,
     settled: bool,
 }
 
-/// Neighbours of a tile as (tiles east, tiles south), and the nodes of this tile that each sees: a
-/// range of columns and of rows.
-const NEIGHBOURS: [((isize, isize), [usize; 4]); 8] = {
-    const L: usize = SIDE - 1;
-    [
-        ((1, 0), [L, SIDE, 0, SIDE]),
-        ((1, 1), [L, SIDE, L, SIDE]),
-        ((0, 1), [0, SIDE, L, SIDE]),
-        ((-1, 1), [0, 1, L, SIDE]),
-        ((-1, 0), [0, 1, 0, SIDE]),
-        ((-1, -1), [0, 1, 0, 1]),
-        ((0, -1), [0, SIDE, 0, 1]),
-        ((1, -1), [L, SIDE, 0, 1]),
-    ]
+impl Default for Outcome {
+    fn default() -> Self {
+        Self {
+            values: [f32::INFINITY; AREA],
+            wakes: [f32::INFINITY; 8],
+            limits: Limits::default(),
+            sweeps: 0,
+            changed: false,
+            settled: true,
+        }
+    }
+}
+
+/// Where news of a tile come from, as (tiles east, tiles south): its neighbours, and itself.
+const SIDES: [(isize, isize); 9] =
+    [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (0, 0)];
+const NEIGHBOURS: [(isize, isize); 8] = {
+    let [neighbours @ .., _] = SIDES;
+    neighbours
 };
+const ITSELF: usize = 8;
+
+/// The rows and the columns of a tile next to the given sides. A corner is in the row.
+fn lines_beside(sides: u16) -> [Lines; 2] {
+    const LAST: Lines = 1 << (SIDE - 1);
+    let line = |at: isize| if at > 0 { LAST } else { 1 };
+    (0..SIDES.len()).filter(|side| sides & 1 << side != 0).fold([0; 2], |[rows, cols], side| {
+        match SIDES[side] {
+            (0, 0) => [ALL, cols],
+            (dx, 0) => [rows, cols | line(dx)],
+            (_, dy) => [rows | line(dy), cols],
+        }
+    })
+}
 
 /// Sweeps of a tile before it goes back into the queue.
 const MAX_SWEEPS: usize = 16;
@@ -103,30 +129,53 @@ const MAX_SWEEPS: usize = 16;
 /// ratio 2500, take under 10; a solve that needs this many would not end.
 const MAX_MEAN_ACTIVATIONS: usize = 2000;
 
+/// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a round but solves
+/// some too early. On a range of 1001² nodes, curvature metric: 4, 8, 16, 32 give 4.6, 4.5, 4.4, 4.5
+/// activations per tile in 1244, 875, 652, 545 rounds; isotropic 3.9, 3.7, 3.6, 3.6 in 1313, 1052, 799, 774.
+const WINDOW_CELLS: f32 = 16.0;
+
 /// The tiles that wait, and what is known of each.
+#[derive(Debug)]
 struct Queue {
     waiting: Vec<u32>,
-    /// Least value that may still change the tile; [`UNREACHED`] if it does not wait.
+    /// Least value that may still change the tile; infinite if it does not wait.
     key: Vec<f32>,
-    /// News above this cannot improve the tile, see [`settle`].
-    ceiling: Vec<f32>,
-    /// Direction the last news came from, as the first sweep to make: bit 0 from the east, bit 1 from the south.
-    heading: Vec<u8>,
+    /// The sides of the tile that have news, one bit each in the order of [`SIDES`], and which of
+    /// them has the least.
+    sides: Vec<u16>,
+    first: Vec<u8>,
+    limits: Vec<Limits>,
     /// Number of the round that last took the tile or one of its neighbours.
     taken: Vec<u32>,
 }
 
 impl Queue {
-    fn wake(&mut self, tile: usize, key: f32, heading: u8) {
-        self.heading[tile] = heading;
-        if self.key[tile] == UNREACHED {
-            self.waiting.push(tile as u32);
+    fn new(tiles: usize) -> Self {
+        Self {
+            waiting: Vec::new(),
+            key: vec![f32::INFINITY; tiles],
+            sides: vec![0; tiles],
+            first: vec![0; tiles],
+            limits: vec![Limits::default(); tiles],
+            taken: vec![0; tiles],
         }
-        self.key[tile] = self.key[tile].min(key);
+    }
+
+    /// News of value `key` from the neighbour `side`.
+    fn wake(&mut self, tile: usize, key: f32, side: usize) {
+        if self.key[tile] == f32::INFINITY {
+            self.waiting.push(tile as u32);
+            self.sides[tile] = 0;
+        }
+        self.sides[tile] |= 1 << side;
+        if key < self.key[tile] {
+            self.key[tile] = key;
+            self.first[tile] = side as u8;
+        }
     }
 
     fn least_key(&self) -> f32 {
-        self.waiting.iter().map(|&t| self.key[t as usize]).fold(UNREACHED, f32::min)
+        self.waiting.iter().map(|&t| self.key[t as usize]).fold(f32::INFINITY, f32::min)
     }
 
     /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first.
@@ -142,16 +191,16 @@ impl Queue {
                 continue;
             }
             taken.push(tile);
-            self.key[tile as usize] = UNREACHED;
+            self.key[tile as usize] = f32::INFINITY;
             self.taken[tile as usize] = round;
-            for ((dx, dy), _) in NEIGHBOURS {
+            for (dx, dy) in NEIGHBOURS {
                 if let Some(n) = neighbour(tiling, tile as usize, dx, dy) {
                     self.taken[n] = round;
                 }
             }
         }
         let key = &self.key;
-        self.waiting.retain(|&t| key[t as usize] != UNREACHED);
+        self.waiting.retain(|&t| key[t as usize] < f32::INFINITY);
     }
 }
 
@@ -161,121 +210,110 @@ fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize
     Some(y * tiling.across + x)
 }
 
-/// Relaxes `values` to the solution of the discrete equation, starting from the tiles that hold any.
-///
-/// `done(limit, values)` is asked between rounds whether what is final is enough: values that are lower than `limit` by
-/// more than the longest step of their tile.
-pub(super) fn solve(
-    field: &TensorField,
-    values: &mut Values,
-    tolerance: f32,
-    mut done: impl FnMut(f32, &Values) -> bool,
-    control: &Control,
-) -> Result<Statistics> {
-    let tiling = field.tiling;
-    let mut queue = Queue {
-        waiting: Vec::new(),
-        key: vec![UNREACHED; tiling.tiles()],
-        ceiling: vec![UNREACHED; tiling.tiles()],
-        heading: vec![0; tiling.tiles()],
-        taken: vec![0; tiling.tiles()],
-    };
-    wake_start(field, values, &mut queue);
-    let window = WINDOW_CELLS * field.mean_step;
-    let mut statistics = Statistics::default();
-    let mut seen = vec![false; tiling.tiles()];
-    let mut taken = Vec::new();
-    let mut outcomes: Vec<Outcome> = Vec::new();
-    while !queue.waiting.is_empty() {
-        control.check()?;
-        let least = queue.least_key();
-        if done(least, values) {
-            break;
-        }
-        statistics.rounds += 1;
-        queue.take(&tiling, least + window, statistics.rounds as u32, &mut taken);
-        let solve_one = |bench: &mut Workbench, &tile: &u32| {
-            bench.solve(field, values, tile, queue.heading[tile as usize], tolerance)
-        };
-        if rayon::current_num_threads() > 1 && taken.len() >= MIN_PARALLEL {
-            taken
-                .par_iter()
-                .map_init(Workbench::default, solve_one)
-                .collect_into_vec(&mut outcomes);
-        } else {
-            let mut bench = Workbench::default();
-            outcomes.clear();
-            outcomes.extend(taken.iter().map(|tile| solve_one(&mut bench, tile)));
-        }
-        for outcome in &outcomes {
-            statistics.activations += 1;
-            statistics.sweeps += outcome.sweeps;
-            seen[outcome.tile as usize] = true;
-            settle(field, values, &mut queue, outcome);
-        }
-        if statistics.activations > MAX_MEAN_ACTIVATIONS * tiling.tiles() {
-            return Err(Error::usage(
-                "the distance does not settle on this metric; its tensors are too extreme",
-            ));
-        }
-        if statistics.rounds.is_multiple_of(64) {
-            let share = seen.iter().filter(|&&s| s).count() as f64 / tiling.tiles() as f64;
-            control.report("solving distance", share);
-        }
-    }
-    control.report("solving distance", 1.0);
-    statistics.tiles = seen.iter().filter(|&&s| s).count();
-    Ok(statistics)
+/// What the solvers of a round read.
+#[derive(Debug)]
+struct Shared {
+    values: Values,
+    queue: Queue,
+    taken: Vec<u32>,
 }
 
-/// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a round but solves
-/// some too early. On a range of 1001² nodes, curvature metric: 4, 8, 16, 32 give 4.6, 4.5, 4.4, 4.5
-/// activations per tile in 1244, 875, 652, 545 rounds; isotropic 3.9, 3.7, 3.6, 3.6 in 1313, 1052, 799, 774.
-const WINDOW_CELLS: f32 = 16.0;
+/// Relaxes `values` to the solution of the discrete equation, starting from the tiles that hold any.
+///
+/// `done(is_final, values)` is asked between rounds whether what is final is enough.
+pub(super) fn solve(
+    field: &TensorField,
+    cones: &Cones,
+    values: Values,
+    tolerance: f32,
+    mut done: impl FnMut(&dyn Fn(usize, usize) -> bool, &Values) -> bool,
+    control: &Control,
+) -> Result<(Values, Statistics)> {
+    let tiling = field.tiling;
+    let mut queue = Queue::new(tiling.tiles());
+    wake_start(field, &values, &mut queue);
+    let window = WINDOW_CELLS * field.mean_step;
+    let mut statistics = Statistics::default();
+    let shared = Shared { values, queue, taken: Vec::new() };
+    let work = |bench: &mut Workbench, shared: &Shared, index: usize, outcome: &mut Outcome| {
+        bench.solve(field, cones, shared, shared.taken[index] as usize, tolerance, outcome);
+    };
+    let lead =
+        |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = &Outcome>| -> Result<usize> {
+            let Shared { values, queue, taken } = shared;
+            for (&tile, outcome) in taken.iter().zip(outcomes) {
+                statistics.activations += 1;
+                statistics.sweeps += outcome.sweeps;
+                statistics.tiles += usize::from(queue.limits[tile as usize].longest_step == 0.0);
+                settle(&tiling, values, queue, tile as usize, outcome);
+            }
+            control.check()?;
+            if statistics.activations > MAX_MEAN_ACTIVATIONS * tiling.tiles() {
+                return Err(Error::usage(
+                    "the distance does not settle on this metric; its tensors are too extreme",
+                ));
+            }
+            if statistics.rounds.is_multiple_of(64) {
+                control.report("solving distance", statistics.tiles as f64 / tiling.tiles() as f64);
+            }
+            let least = queue.least_key();
+            let is_final = |col: usize, row: usize| {
+                let value = values.get(col, row);
+                value + queue.limits[tiling.place(col, row).0].longest_step < least
+            };
+            taken.clear();
+            if queue.waiting.is_empty() || done(&is_final, values) {
+                return Ok(0);
+            }
+            statistics.rounds += 1;
+            queue.take(&tiling, least + window, statistics.rounds as u32, taken);
+            Ok(taken.len())
+        };
+    let shared = crew::run(shared, lead, work)?;
+    control.report("solving distance", 1.0);
+    Ok((shared.values, statistics))
+}
 
-/// Fewest tiles of a round that are worth waking other threads for.
-const MIN_PARALLEL: usize = 4;
-
-/// Wakes every tile that holds a start value, and its neighbours.
+/// Wakes every tile that holds a start value, and its neighbours, on all sides.
 fn wake_start(field: &TensorField, values: &Values, queue: &mut Queue) {
     for tile in 0..field.tiling.tiles() {
         let least = values.tiles[tile].iter().copied().fold(UNREACHED, f32::min);
         if least < UNREACHED {
-            queue.wake(tile, least, 0);
-            for ((dx, dy), _) in NEIGHBOURS {
+            queue.wake(tile, least, ITSELF);
+            for side in 0..8 {
+                let (dx, dy) = NEIGHBOURS[side];
                 if let Some(n) = neighbour(&field.tiling, tile, dx, dy) {
-                    queue.wake(n, least, heading(dx, dy));
+                    queue.wake(n, least, opposite(side));
                 }
             }
         }
     }
 }
 
-/// First sweep for news that travel (dx, dy).
-fn heading(dx: isize, dy: isize) -> u8 {
-    u8::from(dx < 0) | u8::from(dy < 0) << 1
+/// The side on which the neighbour sees this tile.
+fn opposite(side: usize) -> usize {
+    (side + 4) % 8
 }
 
 /// Writes a solved tile back and wakes the neighbours it can improve.
-///
-/// On an anisotropic metric a node's value may come from a segment of which one end is *higher* than the node. The
-/// other end `a` is lower, and the higher one `b` matters only while `gb − ga` is less than the length of the
-/// segment, so news are of interest up to the largest value of a tile and its longest step.
-fn settle(field: &TensorField, values: &mut Values, queue: &mut Queue, outcome: &Outcome) {
-    let tile = outcome.tile as usize;
-    values.tiles[tile] = outcome.values;
-    let open = outcome.values.iter().zip(&field.tiles[tile].det).filter(|&(_, &det)| det > 0.0);
-    queue.ceiling[tile] = open.map(|(&g, _)| g).fold(0.0, f32::max) + field.longest_step[tile];
-    if !outcome.settled {
-        let least = outcome.values.iter().copied().fold(UNREACHED, f32::min);
-        queue.wake(tile, least, queue.heading[tile]);
+fn settle(tiling: &Tiling, values: &mut Values, queue: &mut Queue, tile: usize, outcome: &Outcome) {
+    let limits = &mut queue.limits[tile];
+    limits.slack = limits.slack.max(outcome.limits.slack);
+    limits.longest_step = limits.longest_step.max(outcome.limits.longest_step);
+    if !outcome.changed {
+        return;
     }
-    for (((dx, dy), _), &key) in NEIGHBOURS.iter().zip(&outcome.wakes) {
-        if key < UNREACHED
-            && let Some(n) = neighbour(&field.tiling, tile, *dx, *dy)
-            && key < queue.ceiling[n]
+    values.tiles[tile] = outcome.values;
+    if !outcome.settled {
+        let least = outcome.values.iter().copied().fold(f32::INFINITY, f32::min);
+        queue.wake(tile, least, ITSELF);
+    }
+    for (side, &key) in outcome.wakes.iter().enumerate() {
+        let (dx, dy) = NEIGHBOURS[side];
+        if key < f32::INFINITY
+            && let Some(n) = neighbour(tiling, tile, dx, dy)
         {
-            queue.wake(n, key, heading(*dx, *dy));
+            queue.wake(n, key, opposite(side));
         }
     }
 }
@@ -294,56 +332,96 @@ impl Default for Workbench {
 }
 
 impl Workbench {
-    /// Sweeps a tile until it stands still: along the diagonal of the news forth and back, then along the other.
+    /// Sweeps a tile until it stands still: in the direction of the news and back, then across it and back.
     fn solve(
         &mut self,
         field: &TensorField,
-        values: &Values,
-        tile: u32,
-        heading: u8,
+        cones: &Cones,
+        shared: &Shared,
+        tile: usize,
         tolerance: f32,
-    ) -> Outcome {
-        let tensors = &field.tiles[tile as usize];
-        values.block(tile as usize, &mut self.block);
-        let before = values.tiles[tile as usize];
-        // Headings 0 (south-east) and 3 (north-west) share a diagonal, 1 (south-west) and 2 (north-east) the other.
-        let mut mirrored = heading == 1 || heading == 2;
-        let mut descending = heading == 1 || heading == 3;
-        self.bench.load(tensors, &self.block, mirrored, tolerance);
-        let mut sweeps = 0;
-        let mut settled = false;
-        while sweeps < MAX_SWEEPS {
-            sweeps += 1;
-            settled = !self.bench.sweep(descending);
-            if settled {
-                break;
+        outcome: &mut Outcome,
+    ) {
+        let cone = cones.of_tile(tile).map(|cone| (cone, field.tiling.first(tile)));
+        let input = Tile { tensors: &field.tiles[tile], cone, tolerance };
+        shared.values.block(tile, &mut self.block);
+        self.bench.load(&self.block);
+        // Sweeps run away from the news.
+        let (dx, dy) = SIDES[shared.queue.first[tile] as usize];
+        let mut descending = [dy > 0, dx > 0];
+        let mut by_columns = dx != 0 && dy == 0;
+        // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
+        let mut owed = lines_beside(shared.queue.sides[tile]);
+        let mut changes = [0; 2];
+        outcome.sweeps = 0;
+        outcome.changed = false;
+        while outcome.sweeps < MAX_SWEEPS && (owed, changes) != ([0; 2], [0; 2]) {
+            let side = usize::from(by_columns);
+            let dirty = owed[side] | changes[side];
+            if dirty != 0 {
+                changes = self.bench.sweep(&input, by_columns, descending[side], dirty);
+                owed[side] = 0;
+                outcome.sweeps += 1;
+                outcome.changed |= changes != [0; 2];
+                descending[side] = !descending[side];
             }
-            descending = !descending;
-            if sweeps % 2 == 0 {
-                mirrored = !mirrored;
-                self.bench.store(&mut self.block);
-                self.bench.load(tensors, &self.block, mirrored, tolerance);
+            by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps % 2 == 0;
+        }
+        outcome.settled = (owed, changes) == ([0; 2], [0; 2]);
+        outcome.limits = self.bench.store(&mut self.block);
+        if outcome.changed {
+            for (row, line) in outcome.values.chunks_exact_mut(SIDE).enumerate() {
+                line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
             }
+            self.wakes(field, shared, tile, &mut outcome.wakes);
         }
-        self.bench.store(&mut self.block);
-        let mut after = before;
-        for (row, line) in after.chunks_exact_mut(SIDE).enumerate() {
-            line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
-        }
-        Outcome { tile, wakes: wakes(&before, &after), values: after, sweeps, settled }
     }
-}
 
-/// For each neighbour the least changed value it sees, [`UNREACHED`] if nothing changed.
-fn wakes(before: &[f32; AREA], after: &[f32; AREA]) -> [f32; 8] {
-    let news = |col: usize, row: usize| {
-        let (old, new) = (before[row * SIDE + col], after[row * SIDE + col]);
-        if old - new > ROUNDING * new { new } else { UNREACHED }
-    };
-    NEIGHBOURS.map(|(_, [c0, c1, r0, r1])| {
-        let rows = r0..r1;
-        rows.flat_map(|row| (c0..c1).map(move |col| (col, row)))
-            .map(|(col, row)| news(col, row))
-            .fold(UNREACHED, f32::min)
-    })
+    /// The least changed values that could improve a neighbour. A node `x` can be improved by a neighbour `y` only if
+    /// `g(y) < g(x) + slack`.
+    fn wakes(&self, field: &TensorField, shared: &Shared, tile: usize, wakes: &mut [f32; 8]) {
+        const LAST: usize = SIDE - 1;
+        let before = &shared.values.tiles[tile];
+        // News at the borders, with one place before and after.
+        let news = |col: usize, row: usize| {
+            let (old, new) = (before[row * SIDE + col], self.block[row + 1][col + 1]);
+            if old - new > ROUNDING * new { new } else { f32::INFINITY }
+        };
+        let slack = |(dx, dy): (isize, isize)| {
+            neighbour(&field.tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
+        };
+        let improves = |new: f32, old: f32, slack: f32| {
+            if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }
+        };
+        let side = |k: usize, line: [(usize, usize); SIDE], ring: [(usize, usize); SIDE]| {
+            let slack = slack(NEIGHBOURS[k]);
+            let mut padded = [f32::INFINITY; SIDE + 2];
+            for (news_at, &(col, row)) in padded[1..].iter_mut().zip(&line) {
+                *news_at = news(col, row);
+            }
+            let mut key = f32::INFINITY;
+            for i in 0..SIDE {
+                let new = padded[i].min(padded[i + 1]).min(padded[i + 2]);
+                let (col, row) = ring[i];
+                key = key.min(improves(new, self.block[row][col], slack));
+            }
+            key
+        };
+        let corner = |k: usize, col: usize, row: usize| {
+            let (dx, dy) = NEIGHBOURS[k];
+            let old =
+                self.block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
+            improves(news(col, row), old, slack(NEIGHBOURS[k]))
+        };
+        *wakes = [
+            side(0, std::array::from_fn(|i| (LAST, i)), std::array::from_fn(|i| (SIDE + 1, i + 1))),
+            corner(1, LAST, LAST),
+            side(2, std::array::from_fn(|i| (i, LAST)), std::array::from_fn(|i| (i + 1, SIDE + 1))),
+            corner(3, 0, LAST),
+            side(4, std::array::from_fn(|i| (0, i)), std::array::from_fn(|i| (0, i + 1))),
+            corner(5, 0, 0),
+            side(6, std::array::from_fn(|i| (i, 0)), std::array::from_fn(|i| (i + 1, 0))),
+            corner(7, LAST, 0),
+        ];
+    }
 }

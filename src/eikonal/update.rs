@@ -20,6 +20,7 @@
 use glam::DVec2;
 use multiversion::multiversion;
 
+use super::cone::Cone;
 use super::field::{SIDE, TensorTile};
 use crate::Sym2;
 
@@ -54,21 +55,35 @@ pub(crate) fn segment(ga: f64, a: DVec2, gb: f64, b: DVec2, metric: Sym2) -> (f6
 
 /// Side of a block: a tile and one node of each neighbour around it.
 const BLOCK: usize = SIDE + 2;
-/// Anti-diagonals of a tile.
-const STEPS: usize = 2 * SIDE - 1;
-/// Anti-diagonals of a block, and one more on either side.
-const ROWS: usize = STEPS + 4;
 
-/// What the update needs of `D` at a node, [`SIDE`] nodes of one anti-diagonal at a time.
+/// What the update needs of `D` at the [`SIDE`] nodes of a row.
+///
+/// For a triangle with axis neighbour `a` and diagonal neighbour `b`, `w = b − a`, `d = gb − ga`, let `D = [s β; β q]` in the
+/// basis `(a, w)`. The eikonal equation `s t² − 2β t d + q d² = 1`, `t = u − ga`, has the causal root
+///
+/// ```text
+///   t(d) = (β/s) d + √(1/s − (det D/s²) d²)
+/// ```
+///
+/// It is the least over the segment where the slope of the sum (see [`segment`]) changes sign between the ends:
+/// `lo ≤ d ≤ hi` with `lo = −bᵀMw/‖b‖`, `hi = −aᵀMw/‖a‖`. Outside, the least is at an end.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
-    xx: [f32; SIDE],
-    xy: [f32; SIDE],
-    yy: [f32; SIDE],
-    det: [f32; SIDE],
-    /// `1/xx`, `1/yy`.
-    ixx: [f32; SIDE],
-    iyy: [f32; SIDE],
+    /// `1/s`, `det D/s²` and `β/s` for triangles along x, then along y; `β` changes its sign in the other two quadrants.
+    ix: [f32; SIDE],
+    ex: [f32; SIDE],
+    bx: [f32; SIDE],
+    iy: [f32; SIDE],
+    ey: [f32; SIDE],
+    by: [f32; SIDE],
+    /// `hi` along x and y; with the other sign in the other two quadrants.
+    hx: [f32; SIDE],
+    hy: [f32; SIDE],
+    /// `lo` of the triangles with a diagonal (1,1) along x and y, then with (1,−1).
+    rx: [f32; SIDE],
+    ry: [f32; SIDE],
+    fx: [f32; SIDE],
+    fy: [f32; SIDE],
     /// Lengths of the steps (1,0), (0,1), (1,1), (1,−1).
     east: [f32; SIDE],
     south: [f32; SIDE],
@@ -79,155 +94,235 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    /// A node that is never updated: `xx < 0` invalidates every triangle, the steps are endless.
+    /// Nodes that are never updated: all steps are endless.
     const CLOSED: Self = Self {
-        xx: [-1.0; SIDE],
-        xy: [0.0; SIDE],
-        yy: [-1.0; SIDE],
-        det: [0.0; SIDE],
-        ixx: [0.0; SIDE],
-        iyy: [0.0; SIDE],
-        east: [UNREACHED; SIDE],
-        south: [UNREACHED; SIDE],
-        rising: [UNREACHED; SIDE],
-        falling: [UNREACHED; SIDE],
-        tolerance: [UNREACHED; SIDE],
+        ix: [f32::INFINITY; SIDE],
+        ex: [0.0; SIDE],
+        bx: [0.0; SIDE],
+        iy: [f32::INFINITY; SIDE],
+        ey: [0.0; SIDE],
+        by: [0.0; SIDE],
+        hx: [0.0; SIDE],
+        hy: [0.0; SIDE],
+        rx: [0.0; SIDE],
+        ry: [0.0; SIDE],
+        fx: [0.0; SIDE],
+        fy: [0.0; SIDE],
+        east: [f32::INFINITY; SIDE],
+        south: [f32::INFINITY; SIDE],
+        rising: [f32::INFINITY; SIDE],
+        falling: [f32::INFINITY; SIDE],
+        tolerance: [f32::INFINITY; SIDE],
     };
-}
-
-impl Coefficients {
-    /// Sets one lane from the tensor of an open node. `D` is stored as (xx, xy, det): the determinant of a very
-    /// anisotropic tensor would be lost in the rounding of xx·yy − xy².
-    #[inline(always)]
-    fn set(&mut self, i: usize, xx: f32, xy: f32, det: f32, tolerance: f32) {
-        let open = det > 0.0;
-        let choose = |value: f32, closed: f32| if open { value } else { closed };
-        let yy = (det + xy * xy) / xx;
-        let idet = 1.0 / det;
-        let diagonal = |sum: f32| (if sum > 0.0 { sum } else { 0.0 } * idet).sqrt();
-        let (east, south) = ((yy * idet).sqrt(), (xx * idet).sqrt());
-        let (rising, falling) = (diagonal(xx + yy - 2.0 * xy), diagonal(xx + yy + 2.0 * xy));
-        self.xx[i] = choose(xx, -1.0);
-        self.xy[i] = choose(xy, 0.0);
-        self.yy[i] = choose(yy, -1.0);
-        self.det[i] = choose(det, 0.0);
-        self.ixx[i] = choose(1.0 / xx, 0.0);
-        self.iyy[i] = choose(1.0 / yy, 0.0);
-        self.east[i] = choose(east, UNREACHED);
-        self.south[i] = choose(south, UNREACHED);
-        self.rising[i] = choose(rising, UNREACHED);
-        self.falling[i] = choose(falling, UNREACHED);
-        let shortest = least(least(east, south), least(rising, falling));
-        self.tolerance[i] = choose(tolerance * shortest, UNREACHED);
-    }
-
-    #[inline(always)]
-    fn copy_lane(&mut self, lane: usize, from: &Self, i: usize) {
-        self.xx[lane] = from.xx[i];
-        self.xy[lane] = from.xy[i];
-        self.yy[lane] = from.yy[i];
-        self.det[lane] = from.det[i];
-        self.ixx[lane] = from.ixx[i];
-        self.iyy[lane] = from.iyy[i];
-        self.east[lane] = from.east[i];
-        self.south[lane] = from.south[i];
-        self.rising[lane] = from.rising[i];
-        self.falling[lane] = from.falling[i];
-        self.tolerance[lane] = from.tolerance[i];
-    }
-}
-
-/// A tile on the workbench: its values and coefficients, sheared so that the nodes of one anti-diagonal,
-/// which do not depend on each other in a sweep along the diagonal, lie side by side.
-///
-/// `values[c + r + 2][r + 1]` is the node in column `c`, row `r` of the tile, both from −1 to 16. With
-/// `mirrored`, row `r` counts from the last row upwards and the sweep runs along the other diagonal.
-#[derive(Debug)]
-pub(crate) struct Bench {
-    mirrored: bool,
-    values: [[f32; BLOCK]; ROWS],
-    coefficients: [Coefficients; STEPS],
-}
-
-impl Default for Bench {
-    fn default() -> Self {
-        Self {
-            mirrored: false,
-            values: [[UNREACHED; BLOCK]; ROWS],
-            coefficients: [Coefficients::CLOSED; STEPS],
-        }
-    }
 }
 
 /// Values of a tile and of the nodes around it, row by row, each `(column, row)` from −1 to 16.
 pub(crate) type Block = [[f32; BLOCK]; BLOCK];
 
-impl Bench {
-    /// Puts a tile on the bench. A relative change of `tolerance` of a node's shortest step is small.
-    pub(crate) fn load(
-        &mut self,
-        tensors: &TensorTile,
-        block: &Block,
-        mirrored: bool,
-        tolerance: f32,
-    ) {
-        self.mirrored = mirrored;
-        self.load_values(block);
-        load_coefficients(tensors, &mut self.coefficients, mirrored, tolerance);
-    }
+/// A set of rows or of columns of a tile, one bit each.
+pub(crate) type Lines = u32;
 
-    fn load_values(&mut self, block: &Block) {
-        for (row, line) in block.iter().enumerate() {
-            let lane = if self.mirrored { BLOCK - 1 - row } else { row };
-            for (col, &value) in line.iter().enumerate() {
-                self.values[col + lane][lane] = value;
-            }
-        }
-    }
+/// All rows of a tile.
+pub(crate) const ALL: Lines = (1 << SIDE) - 1;
 
-    /// Takes the values back off the bench.
-    pub(crate) fn store(&self, block: &mut Block) {
-        for (row, line) in block.iter_mut().enumerate() {
-            let lane = if self.mirrored { BLOCK - 1 - row } else { row };
-            for (col, value) in line.iter_mut().enumerate() {
-                *value = self.values[col + lane][lane];
-            }
-        }
-    }
+/// What the update needs of `D`, by rows or by columns of a tile, made line by line when first needed.
+#[derive(Debug)]
+struct Prepared {
+    lines: [Coefficients; SIDE],
+    /// What to add to each neighbour in the order of [`RING`], if the tile lies in a [`Cone`].
+    shifts: [[[f32; SIDE]; 8]; SIDE],
+    ready: Lines,
+}
 
-    /// One Gauss–Seidel sweep along the diagonal, away from (`descending`: towards) the first node.
-    /// Whether any node changed by more than its tolerance.
-    pub(crate) fn sweep(&mut self, descending: bool) -> bool {
-        sweep(&mut self.values, &self.coefficients, descending)
+impl Default for Prepared {
+    fn default() -> Self {
+        Self { lines: [Coefficients::CLOSED; SIDE], shifts: [[[0.0; SIDE]; 8]; SIDE], ready: 0 }
     }
 }
 
-/// The coefficients of a tile, sheared like its values.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn load_coefficients(
-    tensors: &TensorTile,
-    coefficients: &mut [Coefficients; STEPS],
-    mirrored: bool,
-    tolerance: f32,
-) {
-    let turn = if mirrored { -1.0 } else { 1.0 };
-    for row in 0..SIDE {
-        let lane = if mirrored { SIDE - 1 - row } else { row };
-        let xx = lanes(&tensors.xx, row * SIDE);
-        let xy = lanes(&tensors.xy, row * SIDE);
-        let det = lanes(&tensors.det, row * SIDE);
-        let mut line = Coefficients::CLOSED;
-        for i in 0..SIDE {
-            line.set(i, xx[i], turn * xy[i], det[i], tolerance);
-        }
-        for col in 0..SIDE {
-            coefficients[col + lane].copy_lane(lane, &line, col);
+/// A tile on the workbench.
+///
+/// A sweep updates a whole row (or column) at a time, 16 nodes side by side, and carries news across the tile in the
+/// directions within 45° of its own. Lines none of whose neighbours changed are left out.
+#[derive(Debug)]
+pub(crate) struct Bench {
+    /// Mirrored on the diagonal while sweeps go by columns.
+    values: Block,
+    by_columns: bool,
+    prepared: [Prepared; 2],
+    limits: Limits,
+}
+
+impl Default for Bench {
+    fn default() -> Self {
+        Self {
+            values: [[UNREACHED; BLOCK]; BLOCK],
+            by_columns: false,
+            prepared: Default::default(),
+            limits: Limits::default(),
         }
     }
+}
+
+/// What is known of the updated nodes of a tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Limits {
+    /// By how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
+    /// is above both ends unless the directions to them make an obtuse angle under `M`; then it may lie below
+    /// one end `a` by up to `−aᵀMb/‖b‖`.
+    pub(crate) slack: f32,
+    /// The longest step of any node.
+    pub(crate) longest_step: f32,
+}
+
+impl Bench {
+    /// Puts a tile on the bench.
+    pub(crate) fn load(&mut self, block: &Block) {
+        self.values = *block;
+        self.by_columns = false;
+        self.prepared.iter_mut().for_each(|side| side.ready = 0);
+        self.limits = Limits::default();
+    }
+
+    /// Takes the values back off the bench.
+    pub(crate) fn store(&mut self, block: &mut Block) -> Limits {
+        self.turn(false);
+        *block = self.values;
+        self.limits
+    }
+
+    fn turn(&mut self, by_columns: bool) {
+        if self.by_columns != by_columns {
+            self.by_columns = by_columns;
+            for row in 0..BLOCK {
+                for col in 0..row {
+                    let value = self.values[row][col];
+                    self.values[row][col] = self.values[col][row];
+                    self.values[col][row] = value;
+                }
+            }
+        }
+    }
+
+    /// One Gauss–Seidel sweep over the rows (or columns) in `dirty`, from the first to the last or the other way
+    /// (`descending`), taking in those that become dirty ahead of it. A change below `tolerance` of a node's shortest step does
+    /// not count.
+    ///
+    /// Returns the rows and the columns next to which something changed: doing either of them again does all.
+    pub(crate) fn sweep(
+        &mut self,
+        tile: &Tile<'_>,
+        by_columns: bool,
+        descending: bool,
+        dirty: Lines,
+    ) -> [Lines; 2] {
+        self.turn(by_columns);
+        let prepared = &mut self.prepared[usize::from(by_columns)];
+        let how = How { by_columns, descending };
+        let mut changed = [0; SIDE];
+        let sweep = if tile.cone.is_some() { sweep_in_cone } else { sweep };
+        let along =
+            sweep(&mut self.values, prepared, tile, how, dirty, &mut changed, &mut self.limits);
+        let across =
+            (0..SIDE).fold(0, |set, i| if changed[i] == 0 { set } else { set | around(i) });
+        if by_columns { [across, along] } else { [along, across] }
+    }
+}
+
+/// What a sweep reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tile<'a> {
+    pub(crate) tensors: &'a TensorTile,
+    /// Cone that the tile lies in, and the tile's first node.
+    pub(crate) cone: Option<(&'a Cone, DVec2)>,
+    pub(crate) tolerance: f32,
+}
+
+/// How to sweep.
+#[derive(Clone, Copy, Debug)]
+struct How {
+    by_columns: bool,
+    descending: bool,
+}
+
+/// A line and the ones beside it.
+#[inline(always)]
+fn around(line: usize) -> Lines {
+    ((0b111 << line) >> 1) & ALL
+}
+
+/// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
+/// tensor would be lost in the rounding of xx·yy − xy².
+#[inline(always)]
+fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
+    let tensors = tile.tensors;
+    let (mut xxs, mut xys, mut dets) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
+    if how.by_columns {
+        for i in 0..SIDE {
+            let place = i * SIDE + line;
+            let (xx, xy, det) = (tensors.xx[place], tensors.xy[place], tensors.det[place]);
+            xys[i] = xy;
+            dets[i] = det;
+            xxs[i] = xx;
+        }
+        for i in 0..SIDE {
+            xxs[i] = (dets[i] + xys[i] * xys[i]) / xxs[i];
+        }
+    } else {
+        xxs = lanes(&tensors.xx, line * SIDE);
+        xys = lanes(&tensors.xy, line * SIDE);
+        dets = lanes(&tensors.det, line * SIDE);
+    }
+    let mut slack = [0f32; SIDE];
+    let mut longest = [0f32; SIDE];
+    for i in 0..SIDE {
+        let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
+        let open = det > 0.0;
+        let ix = 1.0 / xx;
+        let yy = (det + xy * xy) * ix;
+        let (iy, idet) = (1.0 / yy, 1.0 / det);
+        let (east, south) = ((yy * idet).sqrt(), (xx * idet).sqrt());
+        let rising2 = greatest(xx + yy - 2.0 * xy, 1e-30) * idet;
+        let falling2 = greatest(xx + yy + 2.0 * xy, 1e-30) * idet;
+        let (rising, falling) = (rising2.sqrt(), falling2.sqrt());
+        let (irising, ifalling) = (idet / rising, idet / falling);
+        let shortest = least(least(east, south), least(rising, falling));
+        k.ix[i] = choose(open, ix, f32::INFINITY);
+        k.ex[i] = choose(open, det * ix * ix, 0.0);
+        k.bx[i] = choose(open, xy * ix, 0.0);
+        k.iy[i] = choose(open, iy, f32::INFINITY);
+        k.ey[i] = choose(open, det * iy * iy, 0.0);
+        k.by[i] = choose(open, xy * iy, 0.0);
+        k.hx[i] = choose(open, xy * east * iy, 0.0);
+        k.hy[i] = choose(open, xy * south * ix, 0.0);
+        k.rx[i] = choose(open, (xy - xx) * irising, 0.0);
+        k.ry[i] = choose(open, (xy - yy) * irising, 0.0);
+        k.fx[i] = choose(open, -(xx + xy) * ifalling, 0.0);
+        k.fy[i] = choose(open, -(yy + xy) * ifalling, 0.0);
+        k.east[i] = choose(open, east, f32::INFINITY);
+        k.south[i] = choose(open, south, f32::INFINITY);
+        k.rising[i] = choose(open, rising, f32::INFINITY);
+        k.falling[i] = choose(open, falling, f32::INFINITY);
+        k.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
+        let obtuse = greatest(
+            greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
+            greatest(
+                greatest(-k.rx[i] - rising, -k.ry[i] - rising),
+                greatest(-k.fx[i] - falling, -k.fy[i] - falling),
+            ),
+        );
+        slack[i] = choose(open, obtuse, 0.0);
+        longest[i] = choose(open, greatest(rising, falling), 0.0);
+    }
+    for i in 0..SIDE {
+        limits.slack = greatest(limits.slack, slack[i]);
+        limits.longest_step = greatest(limits.longest_step, longest[i]);
+    }
+}
+
+#[inline(always)]
+fn choose(yes: bool, a: f32, b: f32) -> f32 {
+    if yes { a } else { b }
 }
 
 /// The smaller of two; compiles to one instruction because NaN is not its business.
@@ -236,7 +331,12 @@ fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// As many values as a tile has rows, from `shift` on.
+#[inline(always)]
+fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// As many values as a tile has columns, from `shift` on.
 #[inline(always)]
 fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
     // Not `array::from_fn` or an iterator: what is not inlined here is not compiled for the wide registers.
@@ -245,28 +345,49 @@ fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
     lanes
 }
 
-/// A diagonal neighbour, hidden where both nodes beside the step to it are unreached: between two walls the step
-/// would leak through. Where they are only not reached yet the step is taken one update later, so the
-/// solution is the same.
+/// A diagonal neighbour, hidden where both nodes beside the step to it are closed: the step would leak through.
 #[inline(always)]
 fn pass(diagonal: f32, a: f32, b: f32) -> f32 {
-    if least(a, b) < UNREACHED { diagonal } else { UNREACHED }
+    if least(a, b) < f32::INFINITY { diagonal } else { f32::INFINITY }
 }
 
-/// One triangle: the value through the segment from axis neighbour `a` to diagonal neighbour `b`.
-///
-/// For `D = [s β; β q]` in the basis where `a = (1,0)`, `b = (1,1)`, and `d = gb − ga`, the eikonal equation
-/// `s t² − 2β t d + q d² = 1`, `t = u − ga`, has the causal root `t = (β d + √(s − det d²))/s`. It is valid where
-/// the step `−D∇g` points between `a` and `b`, that is, where both weights are not negative.
+/// One triangle: the value through the segment from axis neighbour `a` to diagonal neighbour `b`; where the least over
+/// the segment is at an end, not below that.
 #[inline(always)]
-fn triangle(a: f32, b: f32, [s, is, beta, q, det]: [f32; 5]) -> f32 {
-    let d = b - a;
-    let root = s - det * d * d;
-    let t = (beta * d + (if root > 0.0 { root } else { 0.0 }).sqrt()) * is;
-    let weight_b = beta * t - q * d;
-    let weight_a = s * t - beta * d - weight_b;
-    let valid = (root >= 0.0) & (weight_a >= 0.0) & (weight_b >= 0.0);
-    if valid { a + t } else { UNREACHED }
+fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
+    let d = greatest(least(b - a, hi), lo);
+    let root = i - e * (d * d);
+    a + (beta * d + greatest(root, 0.0).sqrt())
+}
+
+/// [`Cone::shift`] for the nodes of one line.
+#[inline(always)]
+fn prepare_shifts(tile: &Tile<'_>, line: usize, how: How, shifts: &mut [[f32; SIDE]; 8]) {
+    let Some((cone, first)) = tile.cone else { return };
+    let turn = |v: DVec2| if how.by_columns { DVec2::new(v.y, v.x) } else { v };
+    let from = turn(first - cone.at);
+    let (m, sides) = (cone.metric, cone.sides.map(turn));
+    let m = if how.by_columns { Sym2::new(m.yy, m.xy, m.xx) } else { m };
+    let [p, q] = sides.map(|side| m.apply(side));
+    let (xx, xy, yy) = (m.xx as f32, m.xy as f32, m.yy as f32);
+    let (px, py, qx, qy) = (p.x as f32, p.y as f32, q.x as f32, q.y as f32);
+    let (x0, y) = (from.x as f32, (from.y + line as f64) as f32);
+    for i in 0..SIDE {
+        let x = x0 + i as f32;
+        let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
+        let g2 = greatest(mx * x + my * y, 0.0);
+        let g = g2.sqrt();
+        let holds = (px * x + py * y <= 0.0) & (qx * x + qy * y <= 0.0) & (g > 0.0);
+        let share = choose(holds, 1.0 / g, 0.0);
+        for k in 0..8 {
+            let (dx, dy) = (RING[k].0 as f32, RING[k].1 as f32);
+            let a = mx * dx + my * dy;
+            let b = xx * (dx * dx) + 2.0 * xy * (dx * dy) + yy * (dy * dy);
+            let sum = g + greatest(g2 + (2.0 * a + b), 0.0).sqrt();
+            let isum = 1.0 / sum;
+            shifts[k][i] = choose(holds, (a * (2.0 * a + b) * isum - g * b) * (isum * share), 0.0);
+        }
+    }
 }
 
 /// See [`Bench::sweep`]. No fused multiply-add, so every instruction set gives the same bits.
@@ -276,49 +397,115 @@ fn triangle(a: f32, b: f32, [s, is, beta, q, det]: [f32; 5]) -> f32 {
     "x86_64+sse4.1",
 ))]
 fn sweep(
-    values: &mut [[f32; BLOCK]; ROWS],
-    coefficients: &[Coefficients; STEPS],
-    descending: bool,
-) -> bool {
-    let mut changed = [0u32; SIDE];
-    for step in 0..STEPS {
-        let step = if descending { STEPS - 1 - step } else { step };
-        let k = &coefficients[step];
-        let line = |along: usize| &values[step + along];
-        let (old, east, west) = (lanes(line(2), 1), lanes(line(3), 1), lanes(line(1), 1));
-        let (south, north) = (lanes(line(3), 2), lanes(line(1), 0));
-        let (south_east, north_west) = (lanes(line(4), 2), lanes(line(0), 0));
-        let (north_east, south_west) = (lanes(line(2), 0), lanes(line(2), 2));
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    sweep_lines::<false>(values, prepared, tile, how, dirty, changed, limits)
+}
+
+/// The same in a tile that lies in a [`Cone`].
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn sweep_in_cone(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    sweep_lines::<true>(values, prepared, tile, how, dirty, changed, limits)
+}
+
+#[inline(always)]
+fn sweep_lines<const IN_CONE: bool>(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    let mut dirty = dirty;
+    for step in 0..SIDE {
+        let row = if how.descending { SIDE - 1 - step } else { step };
+        if dirty & 1 << row == 0 {
+            continue;
+        }
+        dirty &= !(1 << row);
+        let k = &mut prepared.lines[row];
+        if prepared.ready & 1 << row == 0 {
+            prepared.ready |= 1 << row;
+            prepare(tile, row, how, k, limits);
+            if IN_CONE {
+                prepare_shifts(tile, row, how, &mut prepared.shifts[row]);
+            }
+        }
+        let (above, here, below) = (&values[row], &values[row + 1], &values[row + 2]);
+        let (old, east, west) = (lanes(here, 1), lanes(here, 2), lanes(here, 0));
+        let (south, north) = (lanes(below, 1), lanes(above, 1));
+        let (south_east, north_west) = (lanes(below, 2), lanes(above, 0));
+        let (north_east, south_west) = (lanes(above, 2), lanes(below, 0));
+        let shifts = &prepared.shifts[row];
         let mut new = [0f32; SIDE];
+        let mut any = 0;
         for i in 0..SIDE {
-            let (e, w, s, n) = (east[i], west[i], south[i], north[i]);
-            let (se, nw) = (pass(south_east[i], s, e), pass(north_west[i], n, w));
-            let (ne, sw) = (pass(north_east[i], n, e), pass(south_west[i], s, w));
+            let (mut e, mut w, mut s, mut n) = (east[i], west[i], south[i], north[i]);
+            let (mut se, mut nw) = (pass(south_east[i], s, e), pass(north_west[i], n, w));
+            let (mut ne, mut sw) = (pass(north_east[i], n, e), pass(south_west[i], s, w));
+            if IN_CONE {
+                (e, se, s, sw) =
+                    (e + shifts[0][i], se + shifts[1][i], s + shifts[2][i], sw + shifts[3][i]);
+                (w, nw, n, ne) =
+                    (w + shifts[4][i], nw + shifts[5][i], n + shifts[6][i], ne + shifts[7][i]);
+            }
             let edges = least(
                 least(least(e, w) + k.east[i], least(s, n) + k.south[i]),
                 least(least(se, nw) + k.rising[i], least(ne, sw) + k.falling[i]),
             );
-            let along_x = [k.xx[i], k.ixx[i], k.xy[i], k.yy[i], k.det[i]];
-            let along_y = [k.yy[i], k.iyy[i], k.xy[i], k.xx[i], k.det[i]];
-            let across_x = [k.xx[i], k.ixx[i], -k.xy[i], k.yy[i], k.det[i]];
-            let across_y = [k.yy[i], k.iyy[i], -k.xy[i], k.xx[i], k.det[i]];
+            let x = [k.ix[i], k.ex[i], k.bx[i]];
+            let y = [k.iy[i], k.ey[i], k.by[i]];
+            let across_x = [k.ix[i], k.ex[i], -k.bx[i]];
+            let across_y = [k.iy[i], k.ey[i], -k.by[i]];
+            let (hx, hy) = (k.hx[i], k.hy[i]);
             let rising = least(
-                least(triangle(e, se, along_x), triangle(w, nw, along_x)),
-                least(triangle(s, se, along_y), triangle(n, nw, along_y)),
+                least(triangle(e, se, k.rx[i], hx, x), triangle(w, nw, k.rx[i], hx, x)),
+                least(triangle(s, se, k.ry[i], hy, y), triangle(n, nw, k.ry[i], hy, y)),
             );
             let falling = least(
-                least(triangle(e, ne, across_x), triangle(w, sw, across_x)),
-                least(triangle(s, sw, across_y), triangle(n, ne, across_y)),
+                least(
+                    triangle(e, ne, k.fx[i], -hx, across_x),
+                    triangle(w, sw, k.fx[i], -hx, across_x),
+                ),
+                least(
+                    triangle(s, sw, k.fy[i], -hy, across_y),
+                    triangle(n, ne, k.fy[i], -hy, across_y),
+                ),
             );
             let u = least(least(rising, falling), edges);
             let floor = ROUNDING * u;
-            let significant = if k.tolerance[i] > floor { k.tolerance[i] } else { floor };
-            changed[i] |= u32::from(old[i] - u > significant);
+            let significant = greatest(k.tolerance[i], floor);
+            let news = u32::from(old[i] - u > significant);
+            changed[i] |= news;
+            any |= news;
             new[i] = least(u, old[i]);
         }
-        values[step + 2][1..=SIDE].copy_from_slice(&new);
+        values[row + 1][1..=SIDE].copy_from_slice(&new);
+        if any != 0 {
+            dirty |= around(row);
+        }
     }
-    changed.iter().any(|&c| c != 0)
+    dirty
 }
 
 /// Four units in the last place of an `f32`: changes below are rounding.
