@@ -2,8 +2,8 @@
 //!
 //! [`HeightSurface`] fits a tensor-product B-spline to the heights of a terrain. `basis` has the splines of
 //! one axis, `banded` the solver, `fit` the least squares along rows and then columns, `voids` the heights
-//! that have no weight, `plan` the choice of knots and smoothing; `curvature` says what the derivatives
-//! tell of the shape.
+//! that have no weight, `plan` the choice of knots and smoothing; `block` evaluates many nodes at once, `curvature`
+//! says what the derivatives tell of the shape.
 
 mod banded;
 mod basis;

@@ -440,9 +440,12 @@ mod tests {
     #[test]
     fn infinite_and_nan_heights_are_voids() {
         let heights = vec![1.0, f64::NAN, f64::INFINITY, 5.0];
-        let terrain = Terrain::new(frame(2, 2), heights, Crs::none()).unwrap();
+        let mut terrain = Terrain::new(frame(2, 2), heights, Crs::none()).unwrap();
         assert!(terrain.is_void(1, 0) && terrain.is_void(0, 1) && !terrain.is_void(1, 1));
         assert_eq!(terrain.statistics(), (2, Some([1.0, 5.0, 3.0])));
+        terrain.free_heights();
+        assert!(terrain.heights().is_empty() && !terrain.is_void(1, 0));
+        assert_eq!(terrain.frame().nodes(), 4);
         let void = Terrain::new(frame(1, 1), vec![f64::NAN], Crs::none()).unwrap();
         assert_eq!(void.statistics(), (1, None));
         assert!(Terrain::new(frame(2, 2), vec![0.0; 3], Crs::none()).is_err());
