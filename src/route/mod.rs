@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 
 pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
-use crate::eikonal::sees;
+use crate::eikonal::{TensorField, sees};
 use crate::{DistanceMap, Error, MetricField, Result};
 
 /// A route over a surface, from the start region to a goal.
@@ -46,9 +46,19 @@ pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> R
         ))
     })?;
     let frame = metric.surface().frame();
-    let clear = |a, b| frame.contains(a) && frame.contains(b) && sees(&distance.field, a, b);
+    let clear = |a, b| {
+        let field = &distance.field;
+        frame.contains(a) && frame.contains(b) && (is_open_around(field, a, b) || sees(field, a, b))
+    };
     let grid = polish::polish(&grid, &|at| metric.grid_metric(at), &clear);
     Ok(Route::from_line(grid, metric))
+}
+
+/// Whether all cells between two points nearby have open corners: then nothing can be in the way.
+fn is_open_around(field: &TensorField, a: DVec2, b: DVec2) -> bool {
+    let (first, last) = (a.min(b), a.max(b).ceil());
+    (first.y as usize..=last.y as usize)
+        .all(|row| (first.x as usize..=last.x as usize).all(|col| field.is_open(col, row)))
 }
 
 impl Route {
