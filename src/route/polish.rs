@@ -21,12 +21,12 @@ use glam::DVec2;
 use crate::Sym2;
 use crate::metric::length_along;
 
-/// Longest segment in cells, if the line has points for it. The curvature tensor changes within a cell: on real
-/// terrain one cell yields two thirds of what half a cell shortens the routes by, a quarter 1.1 times as much for twice
-/// the work.
+/// Longest segment in cells. The curvature tensor changes within a cell: on rough ground segments of one cell shorten routes
+/// by a half to two thirds of what those of half a cell do, a quarter by 1.1 times as much for twice the work.
 const SEGMENT: f64 = 0.5;
-/// Step in cells of the differences of the metric across the line. The curvature tensor has kinks where a curvature is 0;
-/// a longer step does not see them, a shorter one nothing else.
+/// Step in cells of the differences of the metric across the line. The curvature tensor has kinks where a curvature
+/// is 0, and the line ends as far from them as this is coarse: twice the step shortens routes by a tenth less, while half
+/// of it needs a finer quadrature.
 const PROBE: f64 = 0.25;
 /// No point moves farther at once, in cells: walls are met gently.
 const LONGEST_MOVE: f64 = 1.0;
