@@ -32,10 +32,10 @@ const PROBE: f64 = 0.25;
 const LONGEST_MOVE: f64 = 1.0;
 /// A line that moves less, in cells, has arrived.
 const STILL: f64 = 1e-3;
+/// So has one that became shorter by less than this share: what is left to gain is less still.
+const LEAST_GAIN: f64 = 1e-7;
 /// A step that should bring less than this share of the length, and brings nothing, is noise.
 const NOISE: f64 = 1e-6;
-/// So has one that became shorter by less than this share: what is left to gain is less still, and within noise on rough ground.
-const LEAST_GAIN: f64 = 1e-7;
 /// Enough for all but a few lines on the roughest ground; smooth metrics need 3 to 5.
 const MOST_STEPS: usize = 40;
 /// Shifts between the first one above 0 and the end of all hope.
