@@ -21,7 +21,6 @@ use glam::DVec2;
 use self::cone::Cones;
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
-#[cfg(test)]
 pub(crate) use self::source::sees;
 pub use self::tiles::Statistics;
 use self::tiles::Values;
