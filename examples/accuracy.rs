@@ -209,7 +209,7 @@ fn routes() -> Result<(), Error> {
         let [most, median] = deviation(&metric, DVec2::ZERO, &goals, |at| {
             slowness * unrolled(at) / slowness.max_element()
         })?;
-        cells.push(format!("{most:.2} ({median:.2})"));
+        cells.push(format!("{most:.0e} ({median:.0e})"));
     }
     println!("| cylinder, curvature | {} |", cells.join(" | "));
     cells.clear();
@@ -227,7 +227,7 @@ fn routes() -> Result<(), Error> {
         let metric = Metric::Tensor(tensors.collect());
         let metric = metric.on(&plane, &Modifiers::default())?;
         let [most, median] = deviation(&metric, DVec2::ZERO, &goals, phi)?;
-        cells.push(format!("{most:.2} ({median:.2})"));
+        cells.push(format!("{most:.0e} ({median:.0e})"));
     }
     println!("| diffeomorphism | {} |", cells.join(" | "));
     Ok(())

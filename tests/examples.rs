@@ -73,7 +73,7 @@ fn accuracy_is_what_the_documentation_says() {
     for case in ["cylinder, curvature", "diffeomorphism"] {
         let row = printed.lines().rfind(|line| line.contains(case)).expect(case);
         let most = row.split('|').nth(5).and_then(|cell| cell.trim().split(' ').next()).expect(row);
-        assert!(most.parse::<f64>().expect(most) < 1.5, "{row}");
+        assert!(most.parse::<f64>().expect(most) < 0.003, "{row}");
     }
 }
 

@@ -12,9 +12,10 @@
 //! still `g`, and first order is clean. (Additive factoring: Luo and Qian, J. Comput. Phys. 230 (2011), 5.)
 
 use glam::DVec2;
+use rayon::prelude::*;
 
-use super::field::{SIDE, TensorField, Tiling};
-use super::source::StartRegion;
+use super::field::{AREA, SIDE, TensorField, TensorTile};
+use super::source::{POINT_RADIUS, StartRegion};
 use super::update::RING;
 use crate::Sym2;
 
@@ -22,6 +23,15 @@ use crate::Sym2;
 /// metres, not in cells, or first order would keep its logarithm. At n = 1001 .05, .1, .2, .4 give a ratio of 400
 /// a mean error of 5.2, 2.3, .7, .3 e-4 (after one correction) and are alike on curvature tensors, which vary.
 const RADIUS: f64 = 0.2;
+
+/// The cone is taken out of tiles that are all like its point: the eigenvalues of `M(s) D` lie between the inverse of
+/// this and this, ...
+const ALIKE: f32 = 1.3;
+/// ... and at nodes where they lie in this wider range and no shift is more than this share of a step. On another ground
+/// altogether the cone says nothing of the distance, and on rough ones large shifts would bring values below their
+/// neighbours' without end.
+const SIMILAR: f32 = 4.0;
+const MOST_SHIFT: f32 = 0.5;
 
 /// A point that geodesics fan out from.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +44,39 @@ pub(crate) struct Cone {
 }
 
 impl Cone {
+    pub(crate) fn new(field: &TensorField, at: DVec2, sides: [DVec2; 2]) -> Option<Self> {
+        Some(Self { at, metric: field.metric_at(at)?, sides })
+    }
+
+    /// Whether the cone is to be taken out at a node of a tile that is not like its point: where `M(s) D` has this
+    /// trace and determinant, `D` this trace, and the largest shift this length.
+    #[inline(always)]
+    pub(crate) fn applies(trace: f32, det: f32, trace_of_d: f32, shift: f32) -> bool {
+        // No step is shorter than 1/√λ with the larger eigenvalue λ of D, λ ≤ tr D.
+        let small = shift * shift * trace_of_d <= MOST_SHIFT * MOST_SHIFT;
+        small & Self::in_range(trace, det, SIMILAR)
+    }
+
+    /// Whether all open nodes of a tile are like the point.
+    fn is_like(&self, tile: &TensorTile) -> bool {
+        let (xx, xy, yy) = (self.metric.xx as f32, self.metric.xy as f32, self.metric.yy as f32);
+        let det0 = self.metric.det() as f32;
+        (0..AREA).all(|i| {
+            let (dxx, dxy, det) = (tile.xx[i], tile.xy[i], tile.det[i]);
+            let trace = xx * dxx + 2.0 * xy * dxy + yy * ((det + dxy * dxy) / dxx);
+            det == 0.0 || Self::in_range(trace, det * det0, ALIKE)
+        })
+    }
+
+    /// Whether both roots of `λ² − trace λ + det` lie between `1/most` and `most`.
+    #[inline(always)]
+    fn in_range(trace: f32, det: f32, most: f32) -> bool {
+        (trace <= 2.0 * most)
+            & (most * most - trace * most + det >= 0.0)
+            & (trace * most >= 2.0)
+            & (1.0 - trace * most + det * (most * most) >= 0.0)
+    }
+
     /// Whether `v` from the point leads into the fan: the point is then the nearest of the start region.
     pub(crate) fn holds(&self, v: DVec2) -> bool {
         let mv = self.metric.apply(v);
@@ -54,54 +97,85 @@ impl Cone {
     }
 }
 
+/// The cone that a tile lies in.
+#[derive(Clone, Copy, Debug)]
+struct Here {
+    index: u32,
+    /// Whether the whole tile is like the point of the cone.
+    alike: bool,
+}
+
 /// The cones of a start region, and which of them each tile lies in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cones {
     cones: Vec<Cone>,
-    /// Index of the tile's cone plus one; 0 if it lies in none. Empty if there are no cones.
-    of_tile: Vec<u32>,
+    /// The tile's cone, if it lies in one. Empty if there are no cones.
+    of_tile: Vec<Option<Here>>,
 }
 
 impl Cones {
     pub(crate) fn new(field: &TensorField, start: &StartRegion) -> Self {
-        let cones: Vec<Cone> = start
-            .corners()
-            .filter_map(|(at, sides)| Some(Cone { at, metric: field.metric_at(at)?, sides }))
-            .collect();
-        if cones.is_empty() {
-            return Self::default();
-        }
+        let cones: Vec<Cone> =
+            start.corners().filter_map(|(at, sides)| Cone::new(field, at, sides)).collect();
         let tiling = field.tiling;
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
+        if cones.is_empty() || radius < POINT_RADIUS {
+            return Self::default();
+        }
         let of_tile =
-            (0..tiling.tiles()).map(|tile| nearest(&cones, &tiling, tile, radius)).collect();
+            (0..tiling.tiles()).map(|tile| nearest(&cones, field, tile, radius)).collect();
         Self { cones, of_tile }
     }
 
-    /// The cone that a tile lies in.
-    pub(crate) fn of_tile(&self, tile: usize) -> Option<&Cone> {
-        let index = self.of_tile.get(tile)?.checked_sub(1)?;
-        self.cones.get(index as usize)
+    pub(crate) fn is_empty(&self) -> bool {
+        self.cones.is_empty()
+    }
+
+    /// The cone that a tile lies in, and whether it is to be taken out of all its nodes.
+    pub(crate) fn of_tile(&self, tile: usize) -> Option<(&Cone, bool)> {
+        let here = (*self.of_tile.get(tile)?)?;
+        Some((&self.cones[here.index as usize], here.alike))
     }
 
     /// What to add to the values on the ring of a node.
-    pub(crate) fn shifts(&self, tiling: &Tiling, col: usize, row: usize) -> [f64; 8] {
-        let v = |cone: &Cone| DVec2::new(col as f64, row as f64) - cone.at;
-        match self.of_tile(tiling.place(col, row).0).filter(|cone| cone.holds(v(cone))) {
-            Some(cone) => RING.map(|(i, j)| cone.shift(v(cone), DVec2::new(i.into(), j.into()))),
-            None => [0.0; 8],
-        }
+    pub(crate) fn shifts(&self, field: &TensorField, col: usize, row: usize) -> [f64; 8] {
+        self.at_node(field, col, row).map_or([0.0; 8], |(_, _, shifts)| shifts)
+    }
+
+    /// The cone that is taken out at a node, the way to the node from its point, and the shifts.
+    pub(crate) fn at_node(
+        &self,
+        field: &TensorField,
+        col: usize,
+        row: usize,
+    ) -> Option<(&Cone, DVec2, [f64; 8])> {
+        let (cone, alike) = self.of_tile(field.tiling.place(col, row).0)?;
+        let v = DVec2::new(col as f64, row as f64) - cone.at;
+        let shifts = RING.map(|(i, j)| {
+            let by = DVec2::new(i.into(), j.into());
+            if cone.holds(v + by) { cone.shift(v, by) } else { 0.0 }
+        });
+        let (m, d) = (cone.metric, field.metric(col, row)?.inverse());
+        let trace = m.xx * d.xx + 2.0 * m.xy * d.xy + m.yy * d.yy;
+        let largest = -shifts.into_iter().fold(0.0, f64::min);
+        let applies = alike
+            || Cone::applies(
+                trace as f32,
+                (m.det() * d.det()) as f32,
+                (d.xx + d.yy) as f32,
+                largest as f32,
+            );
+        (cone.holds(v) && applies).then_some((cone, v, shifts))
     }
 }
 
 /// The cone nearest to the middle of a tile under its own metric, if within `radius` cells.
-fn nearest(cones: &[Cone], tiling: &Tiling, tile: usize, radius: f64) -> u32 {
-    let corner = DVec2::new((tile % tiling.across) as f64, (tile / tiling.across) as f64);
-    let middle = corner * SIDE as f64 + 0.5 * (SIDE - 1) as f64;
+fn nearest(cones: &[Cone], field: &TensorField, tile: usize, radius: f64) -> Option<Here> {
+    let middle = field.tiling.first(tile) + 0.5 * (SIDE - 1) as f64;
     let near = cones.iter().enumerate().filter(|(_, cone)| cone.at.distance(middle) <= radius);
-    let nearest =
-        near.min_by(|a, b| a.1.value(middle - a.1.at).total_cmp(&b.1.value(middle - b.1.at)));
-    nearest.map_or(0, |(index, _)| index as u32 + 1)
+    let length = |cone: &Cone| cone.value(middle - cone.at);
+    let (index, cone) = near.min_by(|a, b| length(a.1).total_cmp(&length(b.1)))?;
+    Some(Here { index: index as u32, alike: cone.is_like(&field.tiles[tile]) })
 }
 
 #[cfg(test)]

@@ -173,6 +173,16 @@ impl TensorField {
         (det > 0.0).then(|| Sym2::new((det + xy * xy) / xx, -xy, xx) * det.recip())
     }
 
+    /// Whether all corners of the cell around a point are open that its bilinear value depends on.
+    pub(super) fn is_open_around(&self, at: DVec2) -> bool {
+        let ends = |x: f64| [x.floor().max(0.0) as usize, x.ceil().max(0.0) as usize];
+        ends(at.y).iter().all(|&row| {
+            ends(at.x)
+                .iter()
+                .all(|&col| col < self.cols() && row < self.rows() && self.is_open(col, row))
+        })
+    }
+
     /// Stored metric at grid coordinates: bilinear over the open corners of the cell; `None` if all are closed.
     pub(crate) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
         let corner =

@@ -21,7 +21,6 @@ use glam::DVec2;
 use self::cone::Cones;
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
-#[cfg(test)]
 pub(crate) use self::source::sees;
 pub use self::tiles::Statistics;
 use self::tiles::Values;
@@ -73,11 +72,11 @@ impl Solver {
         goals: &[DVec2],
         control: &Control,
     ) -> Result<DistanceMap> {
-        let cones = Cones::new(&field, start);
-        let mut values = Values::unreached(&field);
+        let mut cones = Cones::new(&field, start);
+        let mut seeded = Values::unreached(&field);
         let mut seeds = 0;
         start.seed(&field, |col, row, value| {
-            values.lower(col, row, value as f32);
+            seeded.lower(col, row, value as f32);
             seeds += 1;
         });
         if seeds == 0 {
@@ -86,11 +85,21 @@ impl Solver {
                  is too extreme to compute with, as around heights that no terrain has",
             ));
         }
-        let done = |is_final: &dyn Fn(usize, usize) -> bool, _: &Values| {
+        let done = |is_final: &dyn Fn(usize, usize) -> bool| {
             !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, goal, is_final))
         };
-        let (values, statistics) =
-            tiles::solve(&field, &cones, values, self.tolerance, done, control)?;
+        let solve = |cones: &Cones| {
+            tiles::solve(&field, cones, seeded.clone(), self.tolerance, &done, control)
+        };
+        let mut solution = solve(&cones)?;
+        if solution.is_none() && !cones.is_empty() {
+            cones = Cones::default();
+            solution = solve(&cones)?;
+        }
+        let (values, statistics) = solution.ok_or_else(|| {
+            Error::usage("the distance does not settle on this metric; its tensors are too extreme")
+        })?;
+        control.report("solving distance", 1.0);
         Ok(DistanceMap {
             field,
             cones,
@@ -267,7 +276,7 @@ fn best_foot(
             _ => f32::INFINITY,
         }
     });
-    let shifts = cones.shifts(&field.tiling, col, row);
+    let shifts = cones.shifts(field, col, row);
     let mut best: Option<(f64, DVec2)> = None;
     let mut offer = |value: f64, foot: DVec2| {
         if best.is_none_or(|(least, _)| value < least) {

@@ -5,7 +5,10 @@ use super::field::TensorField;
 use super::source::StartRegion;
 use super::tiles::Values;
 use super::{DistanceMap, Statistics, best_foot};
-use crate::{Control, Result};
+use crate::{Control, Error, Result};
+
+/// Sweeps after which a solve is given up.
+const MOST_SWEEPS: usize = 2000;
 
 /// The same start values and the same discrete equation as [`Solver`](super::Solver), but each node's update is the plain
 /// minimum over the ring and whole-grid Gauss–Seidel sweeps go on until no node changes at all.
@@ -36,6 +39,9 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
             }
         }
         sweep += 1;
+        if sweep > MOST_SWEEPS {
+            return Err(Error::usage("the distance does not settle on this metric"));
+        }
     }
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
     Ok(DistanceMap {

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::cone::Cone;
 use super::field::TensorField;
 use super::update::segment;
 use crate::Sym2;
@@ -23,9 +24,9 @@ impl From<DVec2> for StartRegion {
     }
 }
 
-/// Around a point, nodes this near get the length of the geodesic to it, of second order, see [`geodesic`]. A ball of a
+/// Around a point or a corner, nodes this near get the length of the geodesic to it, of second order, see [`geodesic`]. A ball of a
 /// fixed size in cells is safe on any metric.
-const POINT_RADIUS: f64 = 4.0;
+pub(super) const POINT_RADIUS: f64 = 4.0;
 /// Around a line or the border of an area: enough that every triangle next to it has values.
 const LINE_RADIUS: f64 = 1.5;
 
@@ -51,9 +52,12 @@ impl StartRegion {
 
     /// Start values in stored units: calls `set(col, row, value)` for nodes on and near the region.
     pub(super) fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
-        for &point in &self.points {
-            near(field, point, point, POINT_RADIUS, |col, row, node| {
-                if let Some(length) = geodesic(field, node, point) {
+        for (at, sides) in self.corners() {
+            let Some(cone) = Cone::new(field, at, sides) else { continue };
+            near(field, at, at, POINT_RADIUS, |col, row, node| {
+                if cone.holds(node - at)
+                    && let Some(length) = geodesic(field, node, at)
+                {
                     set(col, row, length);
                 }
             });
@@ -206,8 +210,13 @@ fn geodesic(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
     let slope = |by: DVec2| {
         let (before, after) =
             ((middle - by).clamp(DVec2::ZERO, last), (middle + by).clamp(DVec2::ZERO, last));
-        let length = (after - before).length().max(f64::MIN_POSITIVE);
-        Some((field.metric_at(after)? + field.metric_at(before)? * -1.0) * length.recip())
+        let length = (after - before).length();
+        // Beside walls there is no telling; there the chord has to do.
+        if length > 0.0 && field.is_open_around(before) && field.is_open_around(after) {
+            Some((field.metric_at(after)? + field.metric_at(before)? * -1.0) * length.recip())
+        } else {
+            Some(Sym2::default())
+        }
     };
     let (mx, my) = (slope(DVec2::X)?, slope(DVec2::Y)?);
     let bend = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));

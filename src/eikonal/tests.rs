@@ -55,8 +55,8 @@ fn order(coarse: f64, fine: f64, refinement: f64) -> f64 {
 
 #[test]
 fn constant_tensors_converge_to_the_norm() {
-    // First order up to the logarithm of a point source: h log h.
-    for (ratio, bound) in [(1.0, 1.4e-3), (4.0, 1.4e-3), (25.0, 1.4e-3), (100.0, 1.5e-3)] {
+    // Clean first order: the cone of the point source, which would make it h log h, is taken out.
+    for (ratio, bound) in [(1.0, 2.5e-4), (4.0, 3e-4), (25.0, 6e-4), (100.0, 1e-3)] {
         let d = rotated(ratio, 0.5);
         let mean = [51, 101, 201, 401].map(|n| {
             let centre = DVec2::splat((n / 2) as f64);
@@ -66,7 +66,7 @@ fn constant_tensors_converge_to_the_norm() {
         });
         assert!(mean[3] < bound, "ratio {ratio}: {mean:?}");
         let orders: Vec<f64> = mean.windows(2).map(|pair| order(pair[0], pair[1], 2.0)).collect();
-        assert!(orders.is_sorted() && orders[2] > 0.6, "ratio {ratio}: {orders:?} in {mean:?}");
+        assert!(orders.iter().all(|&order| order > 0.97), "ratio {ratio}: {orders:?} in {mean:?}");
     }
 }
 

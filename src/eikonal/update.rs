@@ -171,6 +171,8 @@ pub(crate) struct Limits {
     /// is above both ends unless the directions to them make an obtuse angle under `M`; then it may lie below
     /// one end `a` by up to `−aᵀMb/‖b‖`.
     pub(crate) slack: f32,
+    /// By how much a neighbour's value is lowered by a cone at most.
+    pub(crate) shift: f32,
     /// The longest step of any node.
     pub(crate) longest_step: f32,
 }
@@ -233,8 +235,8 @@ impl Bench {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile<'a> {
     pub(crate) tensors: &'a TensorTile,
-    /// Cone that the tile lies in, and the tile's first node.
-    pub(crate) cone: Option<(&'a Cone, DVec2)>,
+    /// Cone that the tile lies in, whether it is to be taken out of all nodes, and the first node.
+    pub(crate) cone: Option<(&'a Cone, bool, DVec2)>,
     pub(crate) tolerance: f32,
 }
 
@@ -251,28 +253,30 @@ fn around(line: usize) -> Lines {
     ((0b111 << line) >> 1) & ALL
 }
 
+/// The tensors of one line of a tile: `xx`, `xy` and the determinant.
+#[inline(always)]
+fn tensors(tile: &Tile<'_>, line: usize, how: How) -> [[f32; SIDE]; 3] {
+    let all = tile.tensors;
+    if !how.by_columns {
+        let place = line * SIDE;
+        return [lanes(&all.xx, place), lanes(&all.xy, place), lanes(&all.det, place)];
+    }
+    let (mut xx, mut xy, mut det) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
+    for i in 0..SIDE {
+        let place = i * SIDE + line;
+        (xx[i], xy[i], det[i]) = (all.xx[place], all.xy[place], all.det[place]);
+    }
+    for i in 0..SIDE {
+        xx[i] = (det[i] + xy[i] * xy[i]) / xx[i];
+    }
+    [xx, xy, det]
+}
+
 /// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
 /// tensor would be lost in the rounding of xx·yy − xy².
 #[inline(always)]
 fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
-    let tensors = tile.tensors;
-    let (mut xxs, mut xys, mut dets) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
-    if how.by_columns {
-        for i in 0..SIDE {
-            let place = i * SIDE + line;
-            let (xx, xy, det) = (tensors.xx[place], tensors.xy[place], tensors.det[place]);
-            xys[i] = xy;
-            dets[i] = det;
-            xxs[i] = xx;
-        }
-        for i in 0..SIDE {
-            xxs[i] = (dets[i] + xys[i] * xys[i]) / xxs[i];
-        }
-    } else {
-        xxs = lanes(&tensors.xx, line * SIDE);
-        xys = lanes(&tensors.xy, line * SIDE);
-        dets = lanes(&tensors.det, line * SIDE);
-    }
+    let [xxs, xys, dets] = tensors(tile, line, how);
     let mut slack = [0f32; SIDE];
     let mut longest = [0f32; SIDE];
     for i in 0..SIDE {
@@ -362,8 +366,14 @@ fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
 
 /// [`Cone::shift`] for the nodes of one line.
 #[inline(always)]
-fn prepare_shifts(tile: &Tile<'_>, line: usize, how: How, shifts: &mut [[f32; SIDE]; 8]) {
-    let Some((cone, first)) = tile.cone else { return };
+fn prepare_shifts(
+    tile: &Tile<'_>,
+    line: usize,
+    how: How,
+    shifts: &mut [[f32; SIDE]; 8],
+    limits: &mut Limits,
+) {
+    let Some((cone, alike, first)) = tile.cone else { return };
     let turn = |v: DVec2| if how.by_columns { DVec2::new(v.y, v.x) } else { v };
     let from = turn(first - cone.at);
     let (m, sides) = (cone.metric, cone.sides.map(turn));
@@ -371,22 +381,39 @@ fn prepare_shifts(tile: &Tile<'_>, line: usize, how: How, shifts: &mut [[f32; SI
     let [p, q] = sides.map(|side| m.apply(side));
     let (xx, xy, yy) = (m.xx as f32, m.xy as f32, m.yy as f32);
     let (px, py, qx, qy) = (p.x as f32, p.y as f32, q.x as f32, q.y as f32);
+    let det0 = m.det() as f32;
+    let [dxx, dxy, ddet] = tensors(tile, line, how);
+    let mut largest = [0f32; SIDE];
     let (x0, y) = (from.x as f32, (from.y + line as f64) as f32);
     for i in 0..SIDE {
         let x = x0 + i as f32;
         let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
         let g2 = greatest(mx * x + my * y, 0.0);
         let g = g2.sqrt();
-        let holds = (px * x + py * y <= 0.0) & (qx * x + qy * y <= 0.0) & (g > 0.0);
-        let share = choose(holds, 1.0 / g, 0.0);
+        let share = choose(g > 0.0, 1.0 / g, 0.0);
         for k in 0..8 {
             let (dx, dy) = (RING[k].0 as f32, RING[k].1 as f32);
             let a = mx * dx + my * dy;
             let b = xx * (dx * dx) + 2.0 * xy * (dx * dy) + yy * (dy * dy);
             let sum = g + greatest(g2 + (2.0 * a + b), 0.0).sqrt();
-            let isum = 1.0 / sum;
+            let isum = choose(sum > 0.0, 1.0 / sum, 0.0);
+            let holds =
+                (px * (x + dx) + py * (y + dy) <= 0.0) & (qx * (x + dx) + qy * (y + dy) <= 0.0);
             shifts[k][i] = choose(holds, (a * (2.0 * a + b) * isum - g * b) * (isum * share), 0.0);
+            largest[i] = greatest(largest[i], -shifts[k][i]);
         }
+        let dyy = (ddet[i] + dxy[i] * dxy[i]) / dxx[i];
+        let trace = xx * dxx[i] + 2.0 * xy * dxy[i] + yy * dyy;
+        let applies = (px * x + py * y <= 0.0)
+            & (qx * x + qy * y <= 0.0)
+            & (alike | Cone::applies(trace, ddet[i] * det0, dxx[i] + dyy, largest[i]));
+        largest[i] = choose(applies, largest[i], 0.0);
+        for k in 0..8 {
+            shifts[k][i] = choose(applies, shifts[k][i], 0.0);
+        }
+    }
+    for i in 0..SIDE {
+        limits.shift = greatest(limits.shift, largest[i]);
     }
 }
 
@@ -448,7 +475,7 @@ fn sweep_lines<const IN_CONE: bool>(
             prepared.ready |= 1 << row;
             prepare(tile, row, how, k, limits);
             if IN_CONE {
-                prepare_shifts(tile, row, how, &mut prepared.shifts[row]);
+                prepare_shifts(tile, row, how, &mut prepared.shifts[row], limits);
             }
         }
         let (above, here, below) = (&values[row], &values[row + 1], &values[row + 2]);

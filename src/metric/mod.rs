@@ -342,22 +342,17 @@ impl<'a> MetricField<'a> {
         self.speed(at).inverse().norm(v)
     }
 
-    /// Length under this metric of a polyline in grid coordinates: `∫ √(vᵀ M v)` by the midpoint rule on pieces
-    /// of at most half a cell.
+    /// Metric `M` in grid coordinates at grid coordinates `at`: a small grid step `by` costs `√(byᵀ M by)`.
+    pub(crate) fn grid_metric(&self, at: DVec2) -> Sym2 {
+        let spacing = self.surface.frame().spacing(at.y);
+        self.speed(at).inverse().stretched(DVec2::new(spacing.x, -spacing.y))
+    }
+
+    /// Length under this metric of a polyline in grid coordinates: `∫ √(vᵀ M v)` by Gauss's two points on pieces of
+    /// at most half a cell.
     #[must_use]
     pub fn length(&self, line: &[DVec2]) -> f64 {
-        line.windows(2)
-            .map(|ends| {
-                let by = ends[1] - ends[0];
-                let pieces = (2.0 * by.length()).ceil().max(1.0);
-                (0..pieces as usize)
-                    .map(|i| {
-                        let middle = ends[0] + by * ((i as f64 + 0.5) / pieces);
-                        self.step_cost(middle, by / pieces)
-                    })
-                    .sum::<f64>()
-            })
-            .sum()
+        length_along(line, |at, by| self.step_cost(at, by))
     }
 }
 
@@ -373,4 +368,23 @@ fn averse_to_climb((d, det): (Sym2, f64), jet: &HeightJet, climb_weight: f64) ->
     let inverse = 1.0 / (1.0 + climb_weight * form);
     let along = Sym2::new(zy * zy, -zx * zy, zx * zx);
     ((d + along * (climb_weight * det)) * inverse, det * inverse)
+}
+
+/// Length of a polyline in grid coordinates by Gauss's two points on pieces of at most half a cell, where a step `by`
+/// around `at` costs `cost(at, by)`.
+pub(crate) fn length_along(line: &[DVec2], cost: impl Fn(DVec2, DVec2) -> f64) -> f64 {
+    // The points lie 1/√12 of the piece on either side of its middle.
+    const ASIDE: f64 = 0.288_675_134_594_812_9;
+    line.windows(2)
+        .map(|ends| {
+            let pieces = (2.0 * ends[0].distance(ends[1])).ceil().max(1.0);
+            let by = (ends[1] - ends[0]) / pieces;
+            (0..pieces as usize)
+                .map(|i| {
+                    let middle = ends[0] + by * (i as f64 + 0.5);
+                    0.5 * (cost(middle - by * ASIDE, by) + cost(middle + by * ASIDE, by))
+                })
+                .sum::<f64>()
+        })
+        .sum()
 }

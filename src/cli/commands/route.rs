@@ -1,5 +1,6 @@
 //! `ridgeway route`: a route from the start to each goal.
 
+use rayon::prelude::*;
 use ridgeway::export::{routes_geojson, routes_gpx, write_profiles};
 use ridgeway::route::trace;
 use ridgeway::{Control, Error, Result, Route};
@@ -7,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::args::{RouteArgs, RunArgs};
 use crate::output::{check_distinct, check_file, write_content};
+use crate::places::Spot;
 use crate::plan::Journey;
 use crate::report::{Report, Table, distance, metres, wrote};
 
@@ -24,11 +26,11 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
     let map = journey.solve(&field, false)?;
-    let mut routes = Vec::new();
-    for goal in &journey.goals {
+    let to_goal = |goal: &Spot| {
         control.check()?;
-        routes.push((format!("to {}", goal.name), trace(&map, &field, goal.at)?));
-    }
+        Ok((format!("to {}", goal.name), trace(&map, &field, goal.at)?))
+    };
+    let routes = journey.goals.par_iter().map(to_goal).collect::<Result<Vec<_>>>()?;
     control.check()?;
     let named: Vec<_> = routes.iter().map(|(name, route)| (name.as_str(), route)).collect();
     let provenance = journey.provenance(std::slice::from_ref(&field));
