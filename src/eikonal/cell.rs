@@ -13,14 +13,16 @@ impl DistanceMap {
         let metric = self.field.metric_at(at)?;
         let mut best: Option<(f64, DVec2, f64)> = None;
         for (a, b) in self.borders(at) {
-            let (ga, gb) = (self.stored(a.0, a.1), self.stored(b.0, b.1));
             let (pa, pb) = (point(a), point(b));
+            let ga = self.stored(a.0, a.1) + self.shift(at, pa);
+            let gb = self.stored(b.0, b.1) + self.shift(at, pb);
             let ends = [(pa, ga, self.is_reached(a.0, a.1)), (pb, gb, self.is_reached(b.0, b.1))];
             let mut offer = |to: DVec2, g: f64| {
                 let sum = g + metric.norm(to - at);
                 if to.distance(at) > MIN_STEP
-                    && g < value
                     && best.is_none_or(|(least, ..)| sum < least)
+                    && let Some(g) = self.stored_at(to)
+                    && g < value
                     && sees(&self.field, at, to)
                 {
                     best = Some((sum, to, g));

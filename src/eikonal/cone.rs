@@ -12,7 +12,6 @@
 //! still `g`, and first order is clean. (Additive factoring: Luo and Qian, J. Comput. Phys. 230 (2011), 5.)
 
 use glam::DVec2;
-use rayon::prelude::*;
 
 use super::field::{AREA, SIDE, TensorField, TensorTile};
 use super::source::{POINT_RADIUS, StartRegion};
@@ -135,6 +134,23 @@ impl Cones {
     pub(crate) fn of_tile(&self, tile: usize) -> Option<(&Cone, bool)> {
         let here = (*self.of_tile.get(tile)?)?;
         Some((&self.cones[here.index as usize], here.alike))
+    }
+
+    /// The cone that is taken out at all the given nodes.
+    pub(crate) fn around(
+        &self,
+        field: &TensorField,
+        nodes: impl IntoIterator<Item = (usize, usize)>,
+    ) -> Option<&Cone> {
+        let mut found: Option<&Cone> = None;
+        for (col, row) in nodes {
+            let (cone, ..) = self.at_node(field, col, row)?;
+            if found.is_some_and(|found| !std::ptr::eq(found, cone)) {
+                return None;
+            }
+            found = Some(cone);
+        }
+        found
     }
 
     /// What to add to the values on the ring of a node.

@@ -219,6 +219,20 @@ impl DistanceMap {
         (length <= SLACK * value).then_some(foot)
     }
 
+    /// The point of the start that the cone around `at` comes from, if nothing is in the way.
+    pub(crate) fn centre_in_sight(&self, at: DVec2) -> Option<DVec2> {
+        let (col, row) = (at.x.round() as usize, at.y.round() as usize);
+        let (cone, ..) = self.cones.at_node(&self.field, col, row)?;
+        sees(&self.field, at, cone.at).then_some(cone.at)
+    }
+
+    /// How much the cone around `at` lowers the value read at `to`, see [`mod@cone`].
+    fn shift(&self, at: DVec2, to: DVec2) -> f64 {
+        let (col, row) = (at.x.round() as usize, at.y.round() as usize);
+        let cone = self.cones.at_node(&self.field, col, row);
+        cone.map_or(0.0, |(cone, ..)| cone.shift(at - cone.at, to - at))
+    }
+
     pub(crate) fn stored_at(&self, at: DVec2) -> Option<f64> {
         let outside = at.x < 0.0
             || at.y < 0.0
@@ -245,7 +259,14 @@ impl DistanceMap {
             corners.iter().filter(|corner| corner.2 > 0.0).map(|&(i, j, w)| (col + i, row + j, w))
         };
         if used().all(|(c, r, _)| self.is_reached(c, r)) {
-            return Some(used().map(|(c, r, w)| w * self.stored(c, r)).sum());
+            let linear: f64 = used().map(|(c, r, w)| w * self.stored(c, r)).sum();
+            // Only what is smooth is interpolated.
+            let bent = self.cones.around(&self.field, used().map(|(c, r, _)| (c, r))).map(|cone| {
+                let g0 = |at: DVec2| cone.value(at - cone.at);
+                let nodes = used().map(|(c, r, w)| w * g0(DVec2::new(c as f64, r as f64)));
+                g0(at) - nodes.sum::<f64>()
+            });
+            return Some(linear + bent.unwrap_or(0.0));
         }
         let metric = self.field.metric_at(at)?;
         used()

@@ -27,7 +27,8 @@ pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
             .or_else(|| descend_to_node(distance, at));
         match next {
             Some((next, lower)) if lower < value => (at, value) = (next, lower),
-            _ => return None,
+            // Near the start an anisotropic distance may have no lower node in reach.
+            _ => break distance.centre_in_sight(at)?,
         }
         line.push(at);
     };
