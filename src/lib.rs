@@ -75,7 +75,7 @@ pub mod surface;
 pub mod terrain;
 
 pub use control::{CancelToken, Control, Progress};
-pub use eikonal::{DistanceMap, Solver, StartRegion};
+pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion};
 pub use error::{Error, Result};
 pub use grid::{GridFrame, Ground};
 pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};

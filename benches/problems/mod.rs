@@ -11,18 +11,19 @@ use std::str::FromStr;
 
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
-use ridgeway::{
+use ridgeway::{Accuracy, 
     Control, Crs, Delta, FitOptions, GridFrame, Ground, HeightJet, HeightSurface, Metric,
     Modifiers, Result, Smoothing, Solver, StartRegion, Sym2, Terrain,
 };
 
 /// Names of the accuracies there are, the best last, see [`solver`].
-pub(crate) const ACCURACIES: [&str; 1] = ["fast"];
+pub(crate) const ACCURACIES: [&str; 2] = ["fast", "high"];
 
 /// The solver of an accuracy; `None` if there is no such.
 pub(crate) fn solver(accuracy: &str) -> Option<Solver> {
     match accuracy {
         "fast" => Some(Solver::default()),
+        "high" => Some(Solver { accuracy: Accuracy::High, ..Solver::default() }),
         _ => None,
     }
 }

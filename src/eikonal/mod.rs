@@ -9,6 +9,7 @@
 
 mod cell;
 mod cone;
+mod correction;
 mod crew;
 mod field;
 pub mod reference;
@@ -19,6 +20,8 @@ mod update;
 use glam::DVec2;
 
 use self::cone::Cones;
+use self::correction::Nodes;
+use self::field::AREA;
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
@@ -33,11 +36,23 @@ pub struct Solver {
     /// Iteration stops where a node would change by less than this share of its shortest step. Default 1e-3,
     /// which moves no value by more than 3e-5 of the largest; tightening it is nearly free, and of no use.
     pub tolerance: f32,
+    /// How accurate.
+    pub accuracy: Accuracy,
+}
+
+/// How accurate a solve is to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Accuracy {
+    /// First order in the spacing.
+    #[default]
+    Fast,
+    /// Second order, by deferred correction (`correction.rs`), with an estimate of the error; takes two to three times as long.
+    High,
 }
 
 impl Default for Solver {
     fn default() -> Self {
-        Self { tolerance: 1e-3 }
+        Self { tolerance: 1e-3, accuracy: Accuracy::default() }
     }
 }
 
@@ -75,8 +90,11 @@ impl Solver {
         let mut cones = Cones::new(&field, start);
         let mut seeded = Values::unreached(&field);
         let mut seeds = 0;
+        let mut fixed = vec![Nodes::default(); field.tiling.tiles()];
         start.seed(&field, |col, row, value| {
             seeded.lower(col, row, value as f32);
+            let (tile, place) = field.tiling.place(col, row);
+            fixed[tile].insert(place);
             seeds += 1;
         });
         if seeds == 0 {
@@ -96,11 +114,19 @@ impl Solver {
             cones = Cones::default();
             solution = solve(&cones)?;
         }
-        let (values, statistics) = solution.ok_or_else(|| {
+        let (mut values, statistics) = solution.ok_or_else(|| {
             Error::usage("the distance does not settle on this metric; its tensors are too extreme")
         })?;
+        let mut errors = None;
+        if self.accuracy == Accuracy::High {
+            let correction =
+                correction::correct(&field, &cones, &values.tiles, &fixed, control)?;
+            values.add(&correction.values);
+            errors = Some(correction.errors);
+        }
         control.report("solving distance", 1.0);
         Ok(DistanceMap {
+            errors,
             field,
             cones,
             values,
@@ -128,6 +154,8 @@ pub struct DistanceMap {
     pub(crate) field: TensorField,
     cones: Cones,
     values: Values,
+    /// Estimates of the error, in high accuracy.
+    errors: Option<Vec<[f32; AREA]>>,
     pub(crate) start: StartRegion,
     statistics: Statistics,
     unit: &'static str,
@@ -164,6 +192,15 @@ impl DistanceMap {
     pub fn at_node(&self, col: usize, row: usize) -> f64 {
         let value = self.values.get(col, row);
         if value < UNREACHED { f64::from(value) / self.field.root_scale() } else { f64::INFINITY }
+    }
+
+    /// Estimate of the error of the distance at a node; `None` where not reached and if the accuracy was not
+    /// [`Accuracy::High`].
+    #[must_use]
+    pub fn error_at_node(&self, col: usize, row: usize) -> Option<f64> {
+        let (tile, place) = self.field.tiling.place(col, row);
+        let error = f64::from(self.errors.as_ref()?[tile][place]) / self.field.root_scale();
+        self.is_reached(col, row).then_some(error)
     }
 
     /// Distances at all nodes, row-major from the north-west, infinite where not reached.
@@ -242,7 +279,7 @@ impl DistanceMap {
             return None;
         }
         let straight = self.start.foot(&self.field, at, SEED_SIGHT).map(|(_, length)| length);
-        straight.into_iter().chain(self.interpolated(at)).min_by(f64::total_cmp)
+        straight.into_iter().chain(self.interpolated(at)).min_by(f64::total_cmp).map(|g| g.max(0.0))
     }
 
     /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.

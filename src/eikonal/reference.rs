@@ -48,6 +48,7 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
         field,
         cones,
         values,
+        errors: None,
         start: start.clone(),
         statistics,
         unit: "",

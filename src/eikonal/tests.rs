@@ -28,7 +28,7 @@ fn solve(field: TensorField, start: DVec2) -> DistanceMap {
 
 /// Without a tolerance, so that the order of the sweeps does not matter.
 fn exactly(field: TensorField, start: DVec2) -> DistanceMap {
-    let solver = Solver { tolerance: 0.0 };
+    let solver = Solver { tolerance: 0.0, ..Solver::default() };
     solver.solve_field(field, &start.into(), &[], &Control::default()).unwrap()
 }
 
@@ -272,7 +272,7 @@ proptest! {
         let f = field(24, 37, |c, r| tensors[r * 24 + c]);
         let start = StartRegion::from(DVec2::new(x, y));
         let control = Control::default();
-        let solver = Solver { tolerance: 0.0 };
+        let solver = Solver { tolerance: 0.0, ..Solver::default() };
         let fast = solver.solve_field(f.clone(), &start, &[], &control);
         let Ok(fast) = fast else {
             prop_assert!(!f.is_open(x.round() as usize, y.round() as usize));
@@ -296,7 +296,7 @@ proptest! {
         let f = field(60, 50, |c, r| tensors[r * 60 + c]);
         let start = StartRegion::from(DVec2::new(x, y));
         let goal = DVec2::from(goal);
-        let solver = Solver { tolerance: 0.0 };
+        let solver = Solver { tolerance: 0.0, ..Solver::default() };
         let control = Control::default();
         if let Ok(whole) = solver.solve_field(f.clone(), &start, &[], &control) {
             let part = solver.solve_field(f, &start, &[goal], &control).unwrap();

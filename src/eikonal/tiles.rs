@@ -40,6 +40,13 @@ impl Values {
         *old = old.min(value);
     }
 
+    /// Adds corrections to the values.
+    pub(super) fn add(&mut self, corrections: &[[f32; AREA]]) {
+        for (values, corrections) in self.tiles.iter_mut().zip(corrections) {
+            values.iter_mut().zip(corrections).for_each(|(value, correction)| *value += correction);
+        }
+    }
+
     /// A tile and the nodes around it; infinite outside the grid.
     fn block(&self, tile: usize, block: &mut Block) {
         let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
@@ -103,11 +110,11 @@ impl Default for Outcome {
 /// Where news of a tile come from, as (tiles east, tiles south): its neighbours, and itself.
 const SIDES: [(isize, isize); 9] =
     [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (0, 0)];
-const NEIGHBOURS: [(isize, isize); 8] = {
+pub(super) const NEIGHBOURS: [(isize, isize); 8] = {
     let [neighbours @ .., _] = SIDES;
     neighbours
 };
-const ITSELF: usize = 8;
+pub(super) const ITSELF: usize = 8;
 
 /// The rows and the columns of a tile next to the given sides. A corner is in the row.
 fn lines_beside(sides: u16) -> [Lines; 2] {
@@ -132,11 +139,11 @@ const MOST_ACTIVATIONS: [u32; 2] = [5000, 200];
 /// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a round but solves
 /// some too early. On a range of 1001² nodes, curvature metric: 4, 8, 16, 32 give 4.6, 4.5, 4.4, 4.5
 /// activations per tile in 1244, 875, 652, 545 rounds; isotropic 3.9, 3.7, 3.6, 3.6 in 1313, 1052, 799, 774.
-const WINDOW_CELLS: f32 = 16.0;
+pub(super) const WINDOW_CELLS: f32 = 16.0;
 
 /// The tiles that wait, and what is known of each.
 #[derive(Debug)]
-struct Queue {
+pub(super) struct Queue {
     waiting: Vec<u32>,
     /// Least value that may still change the tile; infinite if it does not wait.
     key: Vec<f32>,
@@ -152,7 +159,7 @@ struct Queue {
 }
 
 impl Queue {
-    fn new(tiles: usize) -> Self {
+    pub(super) fn new(tiles: usize) -> Self {
         Self {
             waiting: Vec::new(),
             key: vec![f32::INFINITY; tiles],
@@ -165,7 +172,7 @@ impl Queue {
     }
 
     /// News of value `key` from the neighbour `side`.
-    fn wake(&mut self, tile: usize, key: f32, side: usize) {
+    pub(super) fn wake(&mut self, tile: usize, key: f32, side: usize) {
         if self.key[tile] == f32::INFINITY {
             self.waiting.push(tile as u32);
             self.sides[tile] = 0;
@@ -177,12 +184,12 @@ impl Queue {
         }
     }
 
-    fn least_key(&self) -> f32 {
+    pub(super) fn least_key(&self) -> f32 {
         self.waiting.iter().map(|&t| self.key[t as usize]).fold(f32::INFINITY, f32::min)
     }
 
     /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first.
-    fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u32>) {
+    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u32>) {
         taken.clear();
         let key = &self.key;
         let mut candidates: Vec<u32> =
@@ -207,7 +214,7 @@ impl Queue {
     }
 }
 
-fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize> {
+pub(super) fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize> {
     let x = (tile % tiling.across).checked_add_signed(dx).filter(|&x| x < tiling.across)?;
     let y = (tile / tiling.across).checked_add_signed(dy).filter(|&y| y < tiling.down)?;
     Some(y * tiling.across + x)

@@ -68,7 +68,7 @@ const BLOCK: usize = SIDE + 2;
 /// It is the least over the segment where the slope of the sum (see [`segment`]) changes sign between the ends:
 /// `lo ≤ d ≤ hi` with `lo = −bᵀMw/‖b‖`, `hi = −aᵀMw/‖a‖`. Outside, the least is at an end.
 #[derive(Clone, Copy, Debug)]
-struct Coefficients {
+pub(super) struct Coefficients {
     /// `1/s`, `det D/s²` and `β/s` for triangles along x, then along y; `β` changes its sign in the other two quadrants.
     ix: [f32; SIDE],
     ex: [f32; SIDE],
@@ -87,8 +87,8 @@ struct Coefficients {
     /// Lengths of the steps (1,0), (0,1), (1,1), (1,−1).
     east: [f32; SIDE],
     south: [f32; SIDE],
-    rising: [f32; SIDE],
-    falling: [f32; SIDE],
+    pub(super) rising: [f32; SIDE],
+    pub(super) falling: [f32; SIDE],
     /// A change below this is no reason to go on.
     tolerance: [f32; SIDE],
 }
@@ -127,10 +127,10 @@ pub(crate) const ALL: Lines = (1 << SIDE) - 1;
 
 /// What the update needs of `D`, by rows or by columns of a tile, made line by line when first needed.
 #[derive(Debug)]
-struct Prepared {
-    lines: [Coefficients; SIDE],
+pub(super) struct Prepared {
+    pub(super) lines: [Coefficients; SIDE],
     /// What to add to each neighbour in the order of [`RING`], if the tile lies in a [`Cone`].
-    shifts: [[[f32; SIDE]; 8]; SIDE],
+    pub(super) shifts: [[[f32; SIDE]; 8]; SIDE],
     ready: Lines,
 }
 
@@ -242,9 +242,9 @@ pub(crate) struct Tile<'a> {
 
 /// How to sweep.
 #[derive(Clone, Copy, Debug)]
-struct How {
-    by_columns: bool,
-    descending: bool,
+pub(super) struct How {
+    pub(super) by_columns: bool,
+    pub(super) descending: bool,
 }
 
 /// A line and the ones beside it.
@@ -255,7 +255,7 @@ fn around(line: usize) -> Lines {
 
 /// The tensors of one line of a tile: `xx`, `xy` and the determinant.
 #[inline(always)]
-fn tensors(tile: &Tile<'_>, line: usize, how: How) -> [[f32; SIDE]; 3] {
+pub(super) fn tensors(tile: &Tile<'_>, line: usize, how: How) -> [[f32; SIDE]; 3] {
     let all = tile.tensors;
     if !how.by_columns {
         let place = line * SIDE;
@@ -275,7 +275,7 @@ fn tensors(tile: &Tile<'_>, line: usize, how: How) -> [[f32; SIDE]; 3] {
 /// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
 /// tensor would be lost in the rounding of xx·yy − xy².
 #[inline(always)]
-fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
+pub(super) fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
     let [xxs, xys, dets] = tensors(tile, line, how);
     let mut slack = [0f32; SIDE];
     let mut longest = [0f32; SIDE];
@@ -325,24 +325,24 @@ fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits:
 }
 
 #[inline(always)]
-fn choose(yes: bool, a: f32, b: f32) -> f32 {
+pub(super) fn choose(yes: bool, a: f32, b: f32) -> f32 {
     if yes { a } else { b }
 }
 
 /// The smaller of two; compiles to one instruction because NaN is not its business.
 #[inline(always)]
-fn least(a: f32, b: f32) -> f32 {
+pub(super) fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-fn greatest(a: f32, b: f32) -> f32 {
+pub(super) fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// As many values as a tile has columns, from `shift` on.
 #[inline(always)]
-fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
+pub(super) fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
     // Not `array::from_fn` or an iterator: what is not inlined here is not compiled for the wide registers.
     let mut lanes = [0.0; SIDE];
     lanes.copy_from_slice(&line[shift..shift + SIDE]);
@@ -351,8 +351,22 @@ fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
 
 /// A diagonal neighbour, hidden where both nodes beside the step to it are closed: the step would leak through.
 #[inline(always)]
-fn pass(diagonal: f32, a: f32, b: f32) -> f32 {
+pub(super) fn pass(diagonal: f32, a: f32, b: f32) -> f32 {
     if least(a, b) < f32::INFINITY { diagonal } else { f32::INFINITY }
+}
+
+/// What a triangle needs: `lo`, `hi`, `1/s`, `det D/s²`, `β/s`.
+pub(super) type Shape = [f32; 5];
+
+/// The shapes along x and y with a rising diagonal, then with a falling one.
+#[inline(always)]
+pub(super) fn shapes(k: &Coefficients, i: usize) -> [Shape; 4] {
+    [
+        [k.rx[i], k.hx[i], k.ix[i], k.ex[i], k.bx[i]],
+        [k.ry[i], k.hy[i], k.iy[i], k.ey[i], k.by[i]],
+        [k.fx[i], -k.hx[i], k.ix[i], k.ex[i], -k.bx[i]],
+        [k.fy[i], -k.hy[i], k.iy[i], k.ey[i], -k.by[i]],
+    ]
 }
 
 /// One triangle: the value through the segment from axis neighbour `a` to diagonal neighbour `b`; where the least over
@@ -366,7 +380,7 @@ fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
 
 /// [`Cone::shift`] for the nodes of one line.
 #[inline(always)]
-fn prepare_shifts(
+pub(super) fn prepare_shifts(
     tile: &Tile<'_>,
     line: usize,
     how: How,

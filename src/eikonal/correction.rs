@@ -1,0 +1,605 @@
+//! Second order by deferred correction.
+//!
+//! The first-order distance `g` tells where each node's value comes from: a point between two neighbours `a` and `b`, its
+//! foot. There a functional of second order is evaluated,
+//!
+//! ```text
+//!   F(θ) = (1−θ) w(a) + θ w(b) + g0(x + v) + C(θ) − θ(1−θ) S/2,     v = (1−θ)(a−x) + θ(b−x),
+//!   C(θ) = ½ (‖v‖_x + (1−θ) ‖v‖_a + θ ‖v‖_b),
+//! ```
+//!
+//! with the metric by the trapezoidal rule along the step, `w = g − g0` curved between the two by its limited
+//! second difference `S`, and the cone `g0` (see [`mod@super::cone`]) exact. What the functional says more than
+//! the value itself, `ρ = F − g`, travels with the front: the correction solves the linear equation
+//!
+//! ```text
+//!   e(x) = (1−θ) e(a) + θ e(b) + ρ(x).
+//! ```
+//!
+//! Feet are frozen, so there is nothing that could oscillate: `e` is a sum of `ρ` along feet, and `|S/8| ≤ C/2`. A foot is
+//! the least point of its functional, so that an error in it counts only squared. A second round with `g + e` brings
+//! most of what is left.
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::cone::Cones;
+use super::crew;
+use super::field::{AREA, SIDE, TensorField, Tiling};
+use super::tiles::{Queue, WINDOW_CELLS};
+use super::update::{
+    How, Limits, Prepared, RING, ROUNDING, Tile, UNREACHED, choose, greatest, lanes, least, pass,
+    prepare, prepare_shifts, shapes, tensors,
+};
+use crate::{Control, Result};
+
+/// Rounds of correction. The first leaves .3 to 7 % of the first-order error, the second gains up to a factor of 6 at
+/// ratios of 100 and more, and further ones little.
+const ROUNDS: usize = 2;
+/// The transport stands still when nothing changes by more than this many mean cells.
+const TOLERANCE_CELLS: f32 = 1e-4;
+/// Sweeps over a tile before it goes back into the queue, and times it may come back.
+const MOST_SWEEPS: usize = 40;
+const MOST_ACTIVATIONS: u32 = 40;
+
+/// Corrections of the nodes of each tile, and estimates of the error that is left.
+pub(super) struct Correction {
+    pub(super) values: Vec<[f32; AREA]>,
+    pub(super) errors: Vec<[f32; AREA]>,
+}
+
+/// Where the values of a tile's nodes come from, and what the functional of second order adds there.
+struct Feet {
+    /// Index into [`TRIANGLES`]; [`FIXED`] for a node that is not corrected.
+    triangle: [u8; AREA],
+    /// Share of the diagonal neighbour.
+    theta: [f32; AREA],
+    rho: [f32; AREA],
+    /// Neighbours of the tile that it reads, one bit each as in [`RING`].
+    reads: u8,
+}
+
+const FIXED: u8 = 8;
+
+/// The triangles around a node: places in [`RING`] of the axis and the diagonal neighbour.
+const TRIANGLES: [(usize, usize); 8] =
+    [(0, 1), (4, 5), (2, 1), (6, 5), (0, 7), (4, 3), (2, 3), (6, 7)];
+/// The coefficients that each uses, in the order of [`shapes`].
+const SHAPES: [usize; 8] = [0, 0, 1, 1, 2, 2, 3, 3];
+
+/// Nodes around a tile that the functional looks at.
+const MARGIN: usize = 2;
+const WIDE: usize = SIDE + 2 * MARGIN;
+type Patch = [[f32; WIDE]; WIDE];
+
+/// A tile and the nodes around it, `outside` beyond the grid.
+fn patch<'a>(
+    tiling: &Tiling,
+    tile: usize,
+    outside: f32,
+    values: impl Fn(usize) -> &'a [f32; AREA],
+) -> Patch {
+    let (tx, ty) = (tile % tiling.across, tile / tiling.across);
+    let mut patch = [[outside; WIDE]; WIDE];
+    for (j, line) in patch.iter_mut().enumerate() {
+        // Row of the patch, counted in nodes from the tile before the first.
+        let row = ty * SIDE + SIDE + j - MARGIN;
+        let (ny, y) = (row / SIDE, row % SIDE * SIDE);
+        if ny == 0 || ny > tiling.down {
+            continue;
+        }
+        let base = (ny - 1) * tiling.across;
+        if tx > 0 {
+            let west = &values(base + tx - 1)[y + SIDE - MARGIN..];
+            line[..MARGIN].copy_from_slice(&west[..MARGIN]);
+        }
+        line[MARGIN..MARGIN + SIDE].copy_from_slice(&values(base + tx)[y..y + SIDE]);
+        if tx + 1 < tiling.across {
+            let east = &values(base + tx + 1)[y..];
+            line[MARGIN + SIDE..].copy_from_slice(&east[..MARGIN]);
+        }
+    }
+    patch
+}
+
+/// Corrects first-order values; nodes of `fixed` keep theirs.
+pub(super) fn correct(
+    field: &TensorField,
+    cones: &Cones,
+    values: &[[f32; AREA]],
+    fixed: &[Nodes],
+    control: &Control,
+) -> Result<Correction> {
+    let tiles = field.tiling.tiles();
+    let mut total = vec![[0f32; AREA]; tiles];
+    let mut last = Vec::new();
+    for round in 0..ROUNDS {
+        let feet = (0..tiles)
+            .into_par_iter()
+            .map_init(Bench::default, |bench, tile| {
+                control.check()?;
+                let input = Input { field, cones, values, total: &total, fixed, newton: round + 1 };
+                Ok(bench.feet(&input, tile))
+            })
+            .collect::<Result<Vec<Feet>>>()?;
+        last = transport(field, values, &feet, control)?;
+        total.par_iter_mut().zip(&last).for_each(|(total, last)| {
+            total.iter_mut().zip(last).for_each(|(total, last)| *total += last);
+        });
+    }
+    let errors = total.par_iter().zip(&last).zip(values).map(|((total, last), values)| {
+        std::array::from_fn(|i| error_left(values[i], total[i], last[i]))
+    });
+    let errors = errors.collect();
+    Ok(Correction { values: total, errors })
+}
+
+/// What may be wrong with a corrected value: the last round's change, the share of the correction that is typically
+/// left after it, and rounding.
+fn error_left(value: f32, total: f32, last: f32) -> f32 {
+    const SHARE_LEFT: f32 = 0.02;
+    last.abs() + SHARE_LEFT * total.abs() + ROUNDING * value
+}
+
+/// What the feet of a tile are made from.
+struct Input<'a> {
+    field: &'a TensorField,
+    cones: &'a Cones,
+    values: &'a [[f32; AREA]],
+    total: &'a [[f32; AREA]],
+    fixed: &'a [Nodes],
+    newton: usize,
+}
+
+/// Room to find the feet of a tile.
+struct Bench {
+    prepared: Prepared,
+    limits: Limits,
+    lines: Lines,
+}
+
+impl Default for Bench {
+    fn default() -> Self {
+        Self { prepared: Prepared::default(), limits: Limits::default(), lines: Lines::default() }
+    }
+}
+
+impl Bench {
+    fn feet(&mut self, input: &Input<'_>, tile: usize) -> Feet {
+        let field = input.field;
+        let tiling = &field.tiling;
+        let mut feet = Feet {
+            triangle: [FIXED; AREA],
+            theta: [0.0; AREA],
+            rho: [0.0; AREA],
+            reads: 0,
+        };
+        if input.values[tile].iter().all(|&g| g >= UNREACHED) {
+            return feet;
+        }
+        let g = patch(tiling, tile, f32::INFINITY, |t| &input.values[t]);
+        let e = patch(tiling, tile, 0.0, |t| &input.total[t]);
+        let d = [
+            patch(tiling, tile, 0.0, |t| &field.tiles[t].xx),
+            patch(tiling, tile, 0.0, |t| &field.tiles[t].xy),
+            patch(tiling, tile, 0.0, |t| &field.tiles[t].det),
+        ];
+        let cone = input.cones.of_tile(tile).map(|(cone, alike)| (cone, alike, tiling.first(tile)));
+        let this = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0 };
+        let how = How { by_columns: false, descending: false };
+        for row in 0..SIDE {
+            prepare(&this, row, how, &mut self.prepared.lines[row], &mut self.limits);
+            if cone.is_some() {
+                let shifts = &mut self.prepared.shifts[row];
+                prepare_shifts(&this, row, how, shifts, &mut self.limits);
+            } else {
+                self.prepared.shifts[row] = [[0.0; SIDE]; 8];
+            }
+            find_triangles(&self.prepared, &g, &e, row, &mut self.lines);
+            gather(&g, &e, &d, row, &mut self.lines);
+            minimise(&this, row, &self.prepared, input.newton, &mut self.lines);
+            for i in 0..SIDE {
+                let place = row * SIDE + i;
+                if input.values[tile][place] < UNREACHED && !input.fixed[tile].contains(place) {
+                    let triangle = self.lines.triangle[i] as usize;
+                    feet.triangle[place] = triangle as u8;
+                    feet.theta[place] = self.lines.theta[i];
+                    feet.rho[place] = self.lines.rho[i];
+                    let (a, b) = TRIANGLES[triangle];
+                    feet.reads |= outside(i, row, a, 1.0 - self.lines.theta[i]);
+                    feet.reads |= outside(i, row, b, self.lines.theta[i]);
+                }
+            }
+        }
+        feet
+    }
+}
+
+/// The neighbouring tile, if any, that holds the ring's place `k` of a node.
+fn outside(col: usize, row: usize, k: usize, weight: f32) -> u8 {
+    const LAST: i32 = SIDE as i32 - 1;
+    let side = |x: i32| i32::from(x > LAST) - i32::from(x < 0);
+    let step = (side(col as i32 + RING[k].0), side(row as i32 + RING[k].1));
+    match RING.iter().position(|&place| place == step) {
+        Some(neighbour) if weight > 0.0 => 1 << neighbour,
+        _ => 0,
+    }
+}
+
+/// Intermediate results of a line of a tile.
+#[derive(Default)]
+struct Lines {
+    triangle: [u32; SIDE],
+    /// Difference `g(b) − g(a)` as the first-order update reads it, and the foot that follows.
+    slope: [f32; SIDE],
+    theta: [f32; SIDE],
+    rho: [f32; SIDE],
+    /// `g + e` at `a`, `b`, `2a − b`, `2b − a` less that at the node; a large value where unreached.
+    rise: [[f32; SIDE]; 4],
+    /// `M` at `a` and `b`: xx, xy, yy; xx is 0 where closed.
+    metric: [[[f32; SIDE]; 3]; 2],
+    /// `a` and `b − a` from the node.
+    a: [[f32; SIDE]; 2],
+    w: [[f32; SIDE]; 2],
+}
+
+/// The triangle that gives each node of a line its first-order value.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn find_triangles(prepared: &Prepared, g: &Patch, e: &Patch, row: usize, lines: &mut Lines) {
+    let k = &prepared.lines[row];
+    let mut ring = [[0f32; SIDE]; 8];
+    for (n, ring) in ring.iter_mut().enumerate() {
+        let (dx, dy) = RING[n];
+        let at = (row as i32 + dy) as usize + MARGIN;
+        let from = (dx + MARGIN as i32) as usize;
+        let (g, e) = (lanes(&g[at], from), lanes(&e[at], from));
+        for i in 0..SIDE {
+            ring[i] = g[i] + (e[i] + prepared.shifts[row][n][i]);
+        }
+    }
+    for n in [1, 3, 5, 7] {
+        for i in 0..SIDE {
+            ring[n][i] = pass(ring[n][i], ring[n - 1][i], ring[(n + 1) % 8][i]);
+        }
+    }
+    let mut best = [f32::INFINITY; SIDE];
+    for (t, (axis, diagonal)) in TRIANGLES.into_iter().enumerate() {
+        for i in 0..SIDE {
+            let [lo, hi, ix, ex, beta] = shapes(k, i)[SHAPES[t]];
+            let (a, b) = (ring[axis][i], ring[diagonal][i]);
+            let length = choose(SHAPES[t] < 2, k.rising[i], k.falling[i]);
+            let d = b - a;
+            let c = greatest(least(d, hi), lo);
+            let between = a + (beta * c + greatest(ix - ex * (c * c), 0.0).sqrt());
+            let value = choose(d < lo, b + length, between);
+            let better = value < best[i];
+            best[i] = choose(better, value, best[i]);
+            lines.triangle[i] = if better { t as u32 } else { lines.triangle[i] };
+            lines.slope[i] = choose(better, d, lines.slope[i]);
+        }
+    }
+}
+
+/// What the functional needs from around each node's foot.
+fn gather(g: &Patch, e: &Patch, d: &[Patch; 3], row: usize, lines: &mut Lines) {
+    for i in 0..SIDE {
+        let (col, row) = (i + MARGIN, row + MARGIN);
+        let (a, b) = TRIANGLES[(lines.triangle[i] & 7) as usize];
+        let ((ax, ay), (bx, by)) = (RING[a], RING[b]);
+        let (wx, wy) = (bx - ax, by - ay);
+        let (gx, ex) = (g[row][col], e[row][col]);
+        let at = |dx: i32, dy: i32| ((row as i32 + dy) as usize, (col as i32 + dx) as usize);
+        for (n, (dx, dy)) in
+            [(ax, ay), (bx, by), (ax - wx, ay - wy), (bx + wx, by + wy)].into_iter().enumerate()
+        {
+            let (r, c) = at(dx, dy);
+            lines.rise[n][i] = (g[r][c] - gx) + (e[r][c] - ex);
+        }
+        for (n, (dx, dy)) in [(ax, ay), (bx, by)].into_iter().enumerate() {
+            let (r, c) = at(dx, dy);
+            let [xx, xy, det] = [d[0][r][c], d[1][r][c], d[2][r][c]];
+            let m = if det > 0.0 {
+                [(det + xy * xy) / (xx * det), -xy / det, xx / det]
+            } else {
+                [0.0; 3]
+            };
+            for (all, one) in lines.metric[n].iter_mut().zip(m) {
+                all[i] = one;
+            }
+        }
+        (lines.a[0][i], lines.a[1][i]) = (ax as f32, ay as f32);
+        (lines.w[0][i], lines.w[1][i]) = (wx as f32, wy as f32);
+    }
+}
+
+/// `vᵀMv` along a segment, `α + 2βθ + γθ²`.
+#[derive(Clone, Copy)]
+struct Quadratic(f32, f32, f32);
+
+impl Quadratic {
+    #[inline(always)]
+    fn new([xx, xy, yy]: [f32; 3], [ax, ay]: [f32; 2], [wx, wy]: [f32; 2]) -> Self {
+        let (mx, my) = (xx * ax + xy * ay, xy * ax + yy * ay);
+        Self(
+            mx * ax + my * ay,
+            mx * wx + my * wy,
+            xx * wx * wx + 2.0 * xy * wx * wy + yy * wy * wy,
+        )
+    }
+
+    #[inline(always)]
+    fn root(self, t: f32) -> f32 {
+        greatest(self.0 + t * (2.0 * self.1 + t * self.2), 0.0).sqrt()
+    }
+
+    /// The root and its first two derivatives.
+    #[inline(always)]
+    fn jet(self, t: f32) -> [f32; 3] {
+        let root = greatest(self.0 + t * (2.0 * self.1 + t * self.2), 1e-12).sqrt();
+        let inverse = 1.0 / root;
+        let first = (self.1 + t * self.2) * inverse;
+        [root, first, (self.2 - first * first) * inverse]
+    }
+}
+
+/// Finds the foot and value of the functional for each node of a line.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, newton: usize, lines: &mut Lines) {
+    let how = How { by_columns: false, descending: false };
+    let [dxx, dxy, ddet] = tensors(tile, row, how);
+    let shifts = &prepared.shifts[row];
+    let (m0, from) = match tile.cone {
+        Some((cone, _, first)) => (
+            [cone.metric.xx as f32, cone.metric.xy as f32, cone.metric.yy as f32],
+            [(first.x - cone.at.x) as f32, (first.y + row as f64 - cone.at.y) as f32],
+        ),
+        None => ([1.0, 0.0, 1.0], [1.0, 0.0]),
+    };
+    for i in 0..SIDE {
+        let (a, w) = ([lines.a[0][i], lines.a[1][i]], [lines.w[0][i], lines.w[1][i]]);
+        let idet = 1.0 / ddet[i];
+        let dyy = (ddet[i] + dxy[i] * dxy[i]) / dxx[i];
+        let m = [dyy * idet, -dxy[i] * idet, dxx[i] * idet];
+        let here = Quadratic::new(m, a, w);
+
+        // The cone, where it is taken out: any shift is then negative.
+        let mut on = 0.0;
+        for shift in shifts {
+            on = choose(shift[i] < 0.0, 1.0, on);
+        }
+        let v = [from[0] + i as f32, from[1]];
+        let mv = [m0[0] * v[0] + m0[1] * v[1], m0[1] * v[0] + m0[2] * v[1]];
+        let g2 = greatest(mv[0] * v[0] + mv[1] * v[1], 1e-12);
+        let g0 = g2.sqrt();
+        let rise0 = |by: [f32; 2]| {
+            let a = mv[0] * by[0] + mv[1] * by[1];
+            let b = m0[0] * by[0] * by[0] + 2.0 * m0[1] * by[0] * by[1] + m0[2] * by[1] * by[1];
+            let more = 2.0 * a + b;
+            on * more / (g0 + greatest(g2 + more, 0.0).sqrt())
+        };
+        let step = |n: f32| [a[0] + n * w[0], a[1] + n * w[1]];
+        let (ra, rb, rc, rd) =
+            (lines.rise[0][i], lines.rise[1][i], lines.rise[2][i], lines.rise[3][i]);
+        let (has_a, has_b) = (ra < 1e17, rb < 1e17);
+        let (has_c, has_d) = (rc < 1e17, rd < 1e17);
+        let wa = ra - rise0(a);
+        let wb = rb - rise0(step(1.0));
+        let (wc, wd) = (rc - rise0(step(-1.0)), rd - rise0(step(2.0)));
+        let (sa, sb) = (wb - 2.0 * wa + wc, wd - 2.0 * wb + wa);
+        let limited = least(0.5 * (sa + sb).abs(), 2.0 * least(sa.abs(), sb.abs()));
+        let limited = choose(sa * sb > 0.0, choose(sa > 0.0, limited, -limited), 0.0);
+        let one = choose(has_c, sa, choose(has_d, sb, 0.0));
+        let curved = choose(has_c & has_d, limited, one);
+        let free = has_a & has_b;
+        let curvature = choose(free, curved, 0.0);
+        // Between a node and a wall there is only the node.
+        let (lo, hi) = (choose(has_a, 0.0, 1.0), choose(has_b, 1.0, choose(has_a, 0.0, 1.0)));
+        let base = choose(has_a, wa, wb);
+        let slope = choose(free, wb - wa, 0.0);
+
+        let [max_, mbx] = [lines.metric[0], lines.metric[1]];
+        let at_a = choose3(max_[0][i] > 0.0, [max_[0][i], max_[1][i], max_[2][i]], m);
+        let at_b = choose3(mbx[0][i] > 0.0, [mbx[0][i], mbx[1][i], mbx[2][i]], m);
+        let (ca, cb) = (Quadratic::new(at_a, a, w), Quadratic::new(at_b, a, w));
+        let cone = Quadratic::new(m0, [v[0] + a[0], v[1] + a[1]], w);
+
+        // The first-order foot, see `segment`.
+        let d = choose(free, lines.slope[i], 0.0);
+        let across = greatest(here.0 - here.1 * here.1 / here.2, 0.0);
+        let phi = -d * (across / (here.2 * greatest(here.2 - d * d, 1e-12 * here.2))).sqrt();
+        let mut t = greatest(lo, least(hi, phi - here.1 / here.2));
+        for _ in 0..newton {
+            let [_, p0, h0] = here.jet(t);
+            let [va, pa, ha] = ca.jet(t);
+            let [vb, pb, hb] = cb.jet(t);
+            let [_, pc, hc] = cone.jet(t);
+            let first = on * pc + slope - 0.5 * (1.0 - 2.0 * t) * curvature
+                + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
+            let second = on * hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
+            let step = choose(second > 1e-6, first / second, 0.0);
+            t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
+        }
+        let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
+        let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
+        lines.theta[i] = t;
+        lines.rho[i] = base + t * slope + length - bend + rise0(step(t));
+    }
+}
+
+#[inline(always)]
+fn choose3(yes: bool, a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [choose(yes, a[0], b[0]), choose(yes, a[1], b[1]), choose(yes, a[2], b[2])]
+}
+
+/// What the transport shares between rounds.
+struct Shared {
+    e: Vec<[f32; AREA]>,
+    queue: Queue,
+    taken: Vec<u32>,
+}
+
+#[derive(Default)]
+struct Outcome {
+    e: Option<Box<[f32; AREA]>>,
+    settled: bool,
+    changed: bool,
+}
+
+/// Solves `e = (1−θ) e(a) + θ e(b) + ρ`, tiles in the order of their least distance.
+fn transport(
+    field: &TensorField,
+    values: &[[f32; AREA]],
+    feet: &[Feet],
+    control: &Control,
+) -> Result<Vec<[f32; AREA]>> {
+    let tiling = field.tiling;
+    let tiles = tiling.tiles();
+    let tolerance = TOLERANCE_CELLS * field.mean_step;
+    let least = |tile: &[f32; AREA]| tile.iter().copied().fold(f32::INFINITY, f32::min);
+    let keys: Vec<f32> = values.par_iter().map(least).collect();
+    let mut order: Vec<u32> = (0..tiles as u32).filter(|&t| keys[t as usize] < UNREACHED).collect();
+    order.sort_unstable_by(|&a, &b| {
+        keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b))
+    });
+    let mut order = order.into_iter().peekable();
+    let mut activations = vec![0u32; tiles];
+    let mut round = 0;
+    let shared =
+        Shared { e: vec![[0.0; AREA]; tiles], queue: Queue::new(tiles), taken: Vec::new() };
+    let work = |_: &mut (), shared: &Shared, index: usize, outcome: &mut Outcome| {
+        let tile = shared.taken[index] as usize;
+        carry(&tiling, &feet[tile], &shared.e, tile, tolerance, outcome);
+    };
+    let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = &Outcome>| {
+        control.check()?;
+        let Shared { e, queue, taken } = shared;
+        for (&tile, outcome) in taken.iter().zip(outcomes) {
+            let tile = tile as usize;
+            activations[tile] += 1;
+            if let Some(new) = &outcome.e {
+                e[tile] = **new;
+            }
+            let mut wake = |tile: usize| {
+                if activations[tile] < MOST_ACTIVATIONS {
+                    queue.wake(tile, keys[tile], super::tiles::ITSELF);
+                }
+            };
+            if !outcome.settled {
+                wake(tile);
+            }
+            if outcome.changed {
+                for (side, (dx, dy)) in super::tiles::NEIGHBOURS.into_iter().enumerate() {
+                    if let Some(n) = super::tiles::neighbour(&tiling, tile, dx, dy)
+                        && feet[n].reads & 1 << ((side + 4) % 8) != 0
+                    {
+                        wake(n);
+                    }
+                }
+            }
+        }
+        taken.clear();
+        let next = order.peek().map_or(f32::INFINITY, |&tile| keys[tile as usize]);
+        let limit = queue.least_key().min(next) + WINDOW_CELLS * field.mean_step;
+        while let Some(tile) = order.next_if(|&tile| keys[tile as usize] <= limit) {
+            queue.wake(tile as usize, keys[tile as usize], super::tiles::ITSELF);
+        }
+        if limit.is_finite() {
+            round += 1;
+            queue.take(&tiling, limit, round, taken);
+        }
+        Ok(taken.len())
+    };
+    Ok(crew::run(shared, lead, work)?.e)
+}
+
+/// Sweeps the correction through a tile until it stands still.
+fn carry(
+    tiling: &Tiling,
+    feet: &Feet,
+    e: &[[f32; AREA]],
+    tile: usize,
+    tolerance: f32,
+    outcome: &mut Outcome,
+) {
+    let mut block = patch(tiling, tile, 0.0, |t| &e[t]);
+    let mut weights = [[[0f32; SIDE]; 8]; SIDE];
+    for row in 0..SIDE {
+        for i in 0..SIDE {
+            let place = row * SIDE + i;
+            if feet.triangle[place] != FIXED {
+                let (a, b) = TRIANGLES[feet.triangle[place] as usize];
+                weights[row][a][i] = 1.0 - feet.theta[place];
+                weights[row][b][i] = feet.theta[place];
+            }
+        }
+    }
+    let mut largest = 0f32;
+    let mut sweeps = 0;
+    let mut change = f32::INFINITY;
+    while change > tolerance && sweeps < MOST_SWEEPS {
+        change = carry_once(&mut block, &weights, &feet.rho, sweeps % 2 == 1);
+        largest = largest.max(change);
+        sweeps += 1;
+    }
+    outcome.settled = change <= tolerance;
+    outcome.changed = largest > tolerance;
+    let new = outcome.e.get_or_insert_with(|| Box::new([0.0; AREA]));
+    for (row, line) in new.chunks_exact_mut(SIDE).enumerate() {
+        line.copy_from_slice(&block[row + MARGIN][MARGIN..MARGIN + SIDE]);
+    }
+}
+
+/// One sweep over the rows; the largest change.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn carry_once(
+    block: &mut Patch,
+    weights: &[[[f32; SIDE]; 8]; SIDE],
+    rho: &[f32; AREA],
+    descending: bool,
+) -> f32 {
+    let mut largest = [0f32; SIDE];
+    for step in 0..SIDE {
+        let row = if descending { SIDE - 1 - step } else { step };
+        let mut new = lanes(rho, row * SIDE);
+        for n in 0..8 {
+            let (dx, dy) = RING[n];
+            let at = (row as i32 + dy) as usize + MARGIN;
+            let e = lanes(&block[at], (dx + MARGIN as i32) as usize);
+            for i in 0..SIDE {
+                new[i] += weights[row][n][i] * e[i];
+            }
+        }
+        let old = lanes(&block[row + MARGIN], MARGIN);
+        for i in 0..SIDE {
+            largest[i] = greatest(largest[i], (new[i] - old[i]).abs());
+        }
+        block[row + MARGIN][MARGIN..MARGIN + SIDE].copy_from_slice(&new);
+    }
+    largest.into_iter().fold(0.0, f32::max)
+}
+
+/// A set of nodes of a tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Nodes([u64; AREA / 64]);
+
+impl Nodes {
+    pub(super) fn insert(&mut self, place: usize) {
+        self.0[place / 64] |= 1 << (place % 64);
+    }
+
+    fn contains(&self, place: usize) -> bool {
+        self.0[place / 64] & 1 << (place % 64) != 0
+    }
+}
