@@ -11,8 +11,8 @@ use std::str::FromStr;
 
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
-use ridgeway::{Accuracy, 
-    Control, Crs, Delta, FitOptions, GridFrame, Ground, HeightJet, HeightSurface, Metric,
+use ridgeway::{
+    Accuracy, Control, Crs, Delta, FitOptions, GridFrame, Ground, HeightJet, HeightSurface, Metric,
     Modifiers, Result, Smoothing, Solver, StartRegion, Sym2, Terrain,
 };
 

@@ -26,18 +26,21 @@ use rayon::prelude::*;
 use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
+use super::source::Seeds;
 use super::tiles::{Queue, WINDOW_CELLS};
 use super::update::{
     How, Limits, Prepared, RING, ROUNDING, Tile, UNREACHED, choose, greatest, lanes, least, pass,
-    prepare, prepare_shifts, shapes, tensors,
+    prepare, prepare_shifts, tensors,
 };
 use crate::{Control, Result};
 
 /// Rounds of correction. The first leaves .3 to 7 % of the first-order error, the second gains up to a factor of 6 at
 /// ratios of 100 and more, and further ones little.
 const ROUNDS: usize = 2;
+/// Newton steps from the first-order foot to that of the functional.
+const NEWTON_STEPS: usize = 2;
 /// The transport stands still when nothing changes by more than this many mean cells.
-const TOLERANCE_CELLS: f32 = 1e-4;
+const TOLERANCE_CELLS: f32 = 1e-5;
 /// Sweeps over a tile before it goes back into the queue, and times it may come back.
 const MOST_SWEEPS: usize = 40;
 const MOST_ACTIVATIONS: u32 = 40;
@@ -64,8 +67,6 @@ const FIXED: u8 = 8;
 /// The triangles around a node: places in [`RING`] of the axis and the diagonal neighbour.
 const TRIANGLES: [(usize, usize); 8] =
     [(0, 1), (4, 5), (2, 1), (6, 5), (0, 7), (4, 3), (2, 3), (6, 7)];
-/// The coefficients that each uses, in the order of [`shapes`].
-const SHAPES: [usize; 8] = [0, 0, 1, 1, 2, 2, 3, 3];
 
 /// Nodes around a tile that the functional looks at.
 const MARGIN: usize = 2;
@@ -102,23 +103,23 @@ fn patch<'a>(
     patch
 }
 
-/// Corrects first-order values; nodes of `fixed` keep theirs.
+/// Corrects first-order values; nodes of the start keep theirs.
 pub(super) fn correct(
     field: &TensorField,
     cones: &Cones,
     values: &[[f32; AREA]],
-    fixed: &[Nodes],
+    seeds: &[Option<Box<Seeds>>],
     control: &Control,
 ) -> Result<Correction> {
     let tiles = field.tiling.tiles();
     let mut total = vec![[0f32; AREA]; tiles];
     let mut last = Vec::new();
-    for round in 0..ROUNDS {
+    for _ in 0..ROUNDS {
         let feet = (0..tiles)
             .into_par_iter()
             .map_init(Bench::default, |bench, tile| {
                 control.check()?;
-                let input = Input { field, cones, values, total: &total, fixed, newton: round + 1 };
+                let input = Input { field, cones, values, total: &total, seeds };
                 Ok(bench.feet(&input, tile))
             })
             .collect::<Result<Vec<Feet>>>()?;
@@ -147,8 +148,7 @@ struct Input<'a> {
     cones: &'a Cones,
     values: &'a [[f32; AREA]],
     total: &'a [[f32; AREA]],
-    fixed: &'a [Nodes],
-    newton: usize,
+    seeds: &'a [Option<Box<Seeds>>],
 }
 
 /// Room to find the feet of a tile.
@@ -168,12 +168,8 @@ impl Bench {
     fn feet(&mut self, input: &Input<'_>, tile: usize) -> Feet {
         let field = input.field;
         let tiling = &field.tiling;
-        let mut feet = Feet {
-            triangle: [FIXED; AREA],
-            theta: [0.0; AREA],
-            rho: [0.0; AREA],
-            reads: 0,
-        };
+        let mut feet =
+            Feet { triangle: [FIXED; AREA], theta: [0.0; AREA], rho: [0.0; AREA], reads: 0 };
         if input.values[tile].iter().all(|&g| g >= UNREACHED) {
             return feet;
         }
@@ -185,7 +181,8 @@ impl Bench {
             patch(tiling, tile, 0.0, |t| &field.tiles[t].det),
         ];
         let cone = input.cones.of_tile(tile).map(|(cone, alike)| (cone, alike, tiling.first(tile)));
-        let this = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0 };
+        let seeds = input.seeds[tile].as_deref();
+        let this = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
         let how = How { by_columns: false, descending: false };
         for row in 0..SIDE {
             prepare(&this, row, how, &mut self.prepared.lines[row], &mut self.limits);
@@ -197,10 +194,12 @@ impl Bench {
             }
             find_triangles(&self.prepared, &g, &e, row, &mut self.lines);
             gather(&g, &e, &d, row, &mut self.lines);
-            minimise(&this, row, &self.prepared, input.newton, &mut self.lines);
+            minimise(&this, row, &self.prepared, &mut self.lines);
             for i in 0..SIDE {
                 let place = row * SIDE + i;
-                if input.values[tile][place] < UNREACHED && !input.fixed[tile].contains(place) {
+                if input.values[tile][place] < UNREACHED
+                    && seeds.is_none_or(|seeds| seeds[place] >= UNREACHED)
+                {
                     let triangle = self.lines.triangle[i] as usize;
                     feet.triangle[place] = triangle as u8;
                     feet.theta[place] = self.lines.theta[i];
@@ -266,20 +265,63 @@ fn find_triangles(prepared: &Prepared, g: &Patch, e: &Patch, row: usize, lines: 
             ring[n][i] = pass(ring[n][i], ring[n - 1][i], ring[(n + 1) % 8][i]);
         }
     }
-    let mut best = [f32::INFINITY; SIDE];
-    for (t, (axis, diagonal)) in TRIANGLES.into_iter().enumerate() {
+    let mut best = Best { value: [f32::INFINITY; SIDE], ..Best::default() };
+    let [e, se, s, sw, w, nw, n, ne] = &ring;
+    let (hx, hy, bx, by) = (negated(&k.hx), negated(&k.hy), negated(&k.bx), negated(&k.by));
+    let x = (&k.rx, &k.hx, &k.ix, &k.ex, &k.bx, &k.rising);
+    let y = (&k.ry, &k.hy, &k.iy, &k.ey, &k.by, &k.rising);
+    let across_x = (&k.fx, &hx, &k.ix, &k.ex, &bx, &k.falling);
+    let across_y = (&k.fy, &hy, &k.iy, &k.ey, &by, &k.falling);
+    best.offer(0, e, se, x);
+    best.offer(1, w, nw, x);
+    best.offer(2, s, se, y);
+    best.offer(3, n, nw, y);
+    best.offer(4, e, ne, across_x);
+    best.offer(5, w, sw, across_x);
+    best.offer(6, s, sw, across_y);
+    best.offer(7, n, ne, across_y);
+    lines.triangle = best.triangle;
+    lines.slope = best.slope;
+}
+
+type Lanes = [f32; SIDE];
+
+#[inline(always)]
+fn negated(lanes: &Lanes) -> Lanes {
+    let mut negated = *lanes;
+    for lane in &mut negated {
+        *lane = -*lane;
+    }
+    negated
+}
+
+/// The best triangle so far of each node.
+#[derive(Default)]
+struct Best {
+    value: Lanes,
+    slope: Lanes,
+    triangle: [u32; SIDE],
+}
+
+impl Best {
+    /// The triangle `t` between `a` and `b`, with `lo`, `hi`, `1/s`, `det D/s²`, `β/s` and the length of the step to `b`.
+    #[inline(always)]
+    fn offer(
+        &mut self,
+        t: u32,
+        a: &Lanes,
+        b: &Lanes,
+        (lo, hi, ix, ex, beta, length): (&Lanes, &Lanes, &Lanes, &Lanes, &Lanes, &Lanes),
+    ) {
         for i in 0..SIDE {
-            let [lo, hi, ix, ex, beta] = shapes(k, i)[SHAPES[t]];
-            let (a, b) = (ring[axis][i], ring[diagonal][i]);
-            let length = choose(SHAPES[t] < 2, k.rising[i], k.falling[i]);
-            let d = b - a;
-            let c = greatest(least(d, hi), lo);
-            let between = a + (beta * c + greatest(ix - ex * (c * c), 0.0).sqrt());
-            let value = choose(d < lo, b + length, between);
-            let better = value < best[i];
-            best[i] = choose(better, value, best[i]);
-            lines.triangle[i] = if better { t as u32 } else { lines.triangle[i] };
-            lines.slope[i] = choose(better, d, lines.slope[i]);
+            let d = b[i] - a[i];
+            let c = greatest(least(d, hi[i]), lo[i]);
+            let between = a[i] + (beta[i] * c + greatest(ix[i] - ex[i] * (c * c), 0.0).sqrt());
+            let value = choose(d < lo[i], b[i] + length[i], between);
+            let better = value < self.value[i];
+            self.value[i] = choose(better, value, self.value[i]);
+            self.slope[i] = choose(better, d, self.slope[i]);
+            self.triangle[i] = if better { t } else { self.triangle[i] };
         }
     }
 }
@@ -324,11 +366,7 @@ impl Quadratic {
     #[inline(always)]
     fn new([xx, xy, yy]: [f32; 3], [ax, ay]: [f32; 2], [wx, wy]: [f32; 2]) -> Self {
         let (mx, my) = (xx * ax + xy * ay, xy * ax + yy * ay);
-        Self(
-            mx * ax + my * ay,
-            mx * wx + my * wy,
-            xx * wx * wx + 2.0 * xy * wx * wy + yy * wy * wy,
-        )
+        Self(mx * ax + my * ay, mx * wx + my * wy, xx * wx * wx + 2.0 * xy * wx * wy + yy * wy * wy)
     }
 
     #[inline(always)]
@@ -346,13 +384,13 @@ impl Quadratic {
     }
 }
 
-/// Finds the foot and value of the functional for each node of a line.
+/// Finds the foot and the value of the functional for each node of a line.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, newton: usize, lines: &mut Lines) {
+fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, lines: &mut Lines) {
     let how = How { by_columns: false, descending: false };
     let [dxx, dxy, ddet] = tensors(tile, row, how);
     let shifts = &prepared.shifts[row];
@@ -363,75 +401,130 @@ fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, newton: usize, lin
         ),
         None => ([1.0, 0.0, 1.0], [1.0, 0.0]),
     };
+    // Where the cone is taken out some shift is negative.
+    let mut on = [0f32; SIDE];
+    for shift in shifts {
+        for i in 0..SIDE {
+            on[i] = choose(shift[i] < 0.0, 1.0, on[i]);
+        }
+    }
+    let [ra, rb, rc, rd] = lines.rise;
+    let [[axx, axy, ayy], [bxx, bxy, byy]] = lines.metric;
+    let ([ax, ay], [wx, wy]) = (lines.a, lines.w);
+    let slopes = lines.slope;
+    let (mut theta, mut rho) = ([0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
-        let (a, w) = ([lines.a[0][i], lines.a[1][i]], [lines.w[0][i], lines.w[1][i]]);
         let idet = 1.0 / ddet[i];
         let dyy = (ddet[i] + dxy[i] * dxy[i]) / dxx[i];
         let m = [dyy * idet, -dxy[i] * idet, dxx[i] * idet];
-        let here = Quadratic::new(m, a, w);
+        let local = Local {
+            a: [ax[i], ay[i]],
+            w: [wx[i], wy[i]],
+            m,
+            at_a: choose3(axx[i] > 0.0, [axx[i], axy[i], ayy[i]], m),
+            at_b: choose3(bxx[i] > 0.0, [bxx[i], bxy[i], byy[i]], m),
+            cone: ConeAt::new(on[i], m0, [from[0] + i as f32, from[1]]),
+        };
+        (theta[i], rho[i]) = local.minimise([ra[i], rb[i], rc[i], rd[i]], slopes[i]);
+    }
+    lines.theta = theta;
+    lines.rho = rho;
+}
 
-        // The cone, where it is taken out: any shift is then negative.
-        let mut on = 0.0;
-        for shift in shifts {
-            on = choose(shift[i] < 0.0, 1.0, on);
-        }
-        let v = [from[0] + i as f32, from[1]];
+/// The cone seen from a node at `v` from its point, times `on`.
+#[derive(Clone, Copy)]
+struct ConeAt {
+    on: f32,
+    m0: [f32; 3],
+    v: [f32; 2],
+    mv: [f32; 2],
+    g2: f32,
+    g: f32,
+}
+
+impl ConeAt {
+    #[inline(always)]
+    fn new(on: f32, m0: [f32; 3], v: [f32; 2]) -> Self {
         let mv = [m0[0] * v[0] + m0[1] * v[1], m0[1] * v[0] + m0[2] * v[1]];
         let g2 = greatest(mv[0] * v[0] + mv[1] * v[1], 1e-12);
-        let g0 = g2.sqrt();
-        let rise0 = |by: [f32; 2]| {
-            let a = mv[0] * by[0] + mv[1] * by[1];
-            let b = m0[0] * by[0] * by[0] + 2.0 * m0[1] * by[0] * by[1] + m0[2] * by[1] * by[1];
-            let more = 2.0 * a + b;
-            on * more / (g0 + greatest(g2 + more, 0.0).sqrt())
-        };
-        let step = |n: f32| [a[0] + n * w[0], a[1] + n * w[1]];
-        let (ra, rb, rc, rd) =
-            (lines.rise[0][i], lines.rise[1][i], lines.rise[2][i], lines.rise[3][i]);
-        let (has_a, has_b) = (ra < 1e17, rb < 1e17);
-        let (has_c, has_d) = (rc < 1e17, rd < 1e17);
-        let wa = ra - rise0(a);
-        let wb = rb - rise0(step(1.0));
-        let (wc, wd) = (rc - rise0(step(-1.0)), rd - rise0(step(2.0)));
-        let (sa, sb) = (wb - 2.0 * wa + wc, wd - 2.0 * wb + wa);
-        let limited = least(0.5 * (sa + sb).abs(), 2.0 * least(sa.abs(), sb.abs()));
-        let limited = choose(sa * sb > 0.0, choose(sa > 0.0, limited, -limited), 0.0);
-        let one = choose(has_c, sa, choose(has_d, sb, 0.0));
-        let curved = choose(has_c & has_d, limited, one);
-        let free = has_a & has_b;
-        let curvature = choose(free, curved, 0.0);
-        // Between a node and a wall there is only the node.
-        let (lo, hi) = (choose(has_a, 0.0, 1.0), choose(has_b, 1.0, choose(has_a, 0.0, 1.0)));
-        let base = choose(has_a, wa, wb);
-        let slope = choose(free, wb - wa, 0.0);
+        Self { on, m0, v, mv, g2, g: g2.sqrt() }
+    }
 
-        let [max_, mbx] = [lines.metric[0], lines.metric[1]];
-        let at_a = choose3(max_[0][i] > 0.0, [max_[0][i], max_[1][i], max_[2][i]], m);
-        let at_b = choose3(mbx[0][i] > 0.0, [mbx[0][i], mbx[1][i], mbx[2][i]], m);
+    /// `g0(x + by) − g0(x)`.
+    #[inline(always)]
+    fn rise(&self, x: f32, y: f32) -> f32 {
+        let a = self.mv[0] * x + self.mv[1] * y;
+        let b = self.m0[0] * (x * x) + 2.0 * self.m0[1] * (x * y) + self.m0[2] * (y * y);
+        let more = 2.0 * a + b;
+        self.on * more / (self.g + greatest(self.g2 + more, 0.0).sqrt())
+    }
+}
+
+/// What a node's functional is made of: the neighbour `a` from the node, `w = b − a`, `M` at the three, and the cone.
+#[derive(Clone, Copy)]
+struct Local {
+    a: [f32; 2],
+    w: [f32; 2],
+    m: [f32; 3],
+    at_a: [f32; 3],
+    at_b: [f32; 3],
+    cone: ConeAt,
+}
+
+impl Local {
+    /// `θ` and `ρ`, from how much `a`, `b`, `a − w` and `b + w` are above the node, and the first-order slope.
+    #[inline(always)]
+    fn minimise(self, [ra, rb, rc, rd]: [f32; 4], slope: f32) -> (f32, f32) {
+        let Self { a, w, m, at_a, at_b, cone } = self;
+        let wa = ra - cone.rise(a[0], a[1]);
+        let wb = rb - cone.rise(a[0] + w[0], a[1] + w[1]);
+        let wc = rc - cone.rise(a[0] - w[0], a[1] - w[1]);
+        let wd = rd - cone.rise(a[0] + 2.0 * w[0], a[1] + 2.0 * w[1]);
+        let (has_a, has_b) = (ra < 1e17, rb < 1e17);
+        let free = has_a & has_b;
+        let curvature = choose(free, curvature(wa, wb, wc, wd, rc < 1e17, rd < 1e17), 0.0);
+        // Between a node and a wall there is only the node.
+        let lo = choose(has_a, 0.0, 1.0);
+        let hi = choose(has_b, 1.0, lo);
+        let base = choose(has_a, wa, wb);
+        let rise = choose(free, wb - wa, 0.0);
+
+        let here = Quadratic::new(m, a, w);
         let (ca, cb) = (Quadratic::new(at_a, a, w), Quadratic::new(at_b, a, w));
-        let cone = Quadratic::new(m0, [v[0] + a[0], v[1] + a[1]], w);
+        let far = Quadratic::new(cone.m0, [cone.v[0] + a[0], cone.v[1] + a[1]], w);
 
         // The first-order foot, see `segment`.
-        let d = choose(free, lines.slope[i], 0.0);
+        let d = choose(free, slope, 0.0);
         let across = greatest(here.0 - here.1 * here.1 / here.2, 0.0);
         let phi = -d * (across / (here.2 * greatest(here.2 - d * d, 1e-12 * here.2))).sqrt();
         let mut t = greatest(lo, least(hi, phi - here.1 / here.2));
-        for _ in 0..newton {
+        for _ in 0..NEWTON_STEPS {
             let [_, p0, h0] = here.jet(t);
             let [va, pa, ha] = ca.jet(t);
             let [vb, pb, hb] = cb.jet(t);
-            let [_, pc, hc] = cone.jet(t);
-            let first = on * pc + slope - 0.5 * (1.0 - 2.0 * t) * curvature
+            let [_, pc, hc] = far.jet(t);
+            let first = cone.on * pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
                 + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
-            let second = on * hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
+            let second =
+                cone.on * hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
             let step = choose(second > 1e-6, first / second, 0.0);
             t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
         }
         let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
-        lines.theta[i] = t;
-        lines.rho[i] = base + t * slope + length - bend + rise0(step(t));
+        (t, base + t * rise + length - bend + cone.rise(a[0] + t * w[0], a[1] + t * w[1]))
     }
+}
+
+/// Second difference along the ring at the segment between `a` and `b`: the mean of those at both, limited (MC) so that
+/// a kink does not bend what is straight.
+#[inline(always)]
+fn curvature(a: f32, b: f32, before: f32, after: f32, has_before: bool, has_after: bool) -> f32 {
+    let (at_a, at_b) = (b - 2.0 * a + before, after - 2.0 * b + a);
+    let size = least(0.5 * (at_a + at_b).abs(), 2.0 * least(at_a.abs(), at_b.abs()));
+    let limited = choose(at_a * at_b > 0.0, choose(at_a > 0.0, size, -size), 0.0);
+    let single = choose(has_before, at_a, choose(has_after, at_b, 0.0));
+    choose(has_before & has_after, limited, single)
 }
 
 #[inline(always)]
@@ -466,9 +559,7 @@ fn transport(
     let least = |tile: &[f32; AREA]| tile.iter().copied().fold(f32::INFINITY, f32::min);
     let keys: Vec<f32> = values.par_iter().map(least).collect();
     let mut order: Vec<u32> = (0..tiles as u32).filter(|&t| keys[t as usize] < UNREACHED).collect();
-    order.sort_unstable_by(|&a, &b| {
-        keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b))
-    });
+    order.sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
     let mut order = order.into_iter().peekable();
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
@@ -588,18 +679,4 @@ fn carry_once(
         block[row + MARGIN][MARGIN..MARGIN + SIDE].copy_from_slice(&new);
     }
     largest.into_iter().fold(0.0, f32::max)
-}
-
-/// A set of nodes of a tile.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Nodes([u64; AREA / 64]);
-
-impl Nodes {
-    pub(super) fn insert(&mut self, place: usize) {
-        self.0[place / 64] |= 1 << (place % 64);
-    }
-
-    fn contains(&self, place: usize) -> bool {
-        self.0[place / 64] & 1 << (place % 64) != 0
-    }
 }

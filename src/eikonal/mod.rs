@@ -20,7 +20,6 @@ mod update;
 use glam::DVec2;
 
 use self::cone::Cones;
-use self::correction::Nodes;
 use self::field::AREA;
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
@@ -88,16 +87,8 @@ impl Solver {
         control: &Control,
     ) -> Result<DistanceMap> {
         let mut cones = Cones::new(&field, start);
-        let mut seeded = Values::unreached(&field);
-        let mut seeds = 0;
-        let mut fixed = vec![Nodes::default(); field.tiling.tiles()];
-        start.seed(&field, |col, row, value| {
-            seeded.lower(col, row, value as f32);
-            let (tile, place) = field.tiling.place(col, row);
-            fixed[tile].insert(place);
-            seeds += 1;
-        });
-        if seeds == 0 {
+        let seeds = start.seeds(&field);
+        if seeds.iter().all(Option::is_none) {
             return Err(Error::usage(
                 "no open ground at the start: it lies outside the grid, on a void or a barrier, or where the metric \
                  is too extreme to compute with, as around heights that no terrain has",
@@ -106,9 +97,8 @@ impl Solver {
         let done = |is_final: &dyn Fn(usize, usize) -> bool| {
             !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, goal, is_final))
         };
-        let solve = |cones: &Cones| {
-            tiles::solve(&field, cones, seeded.clone(), self.tolerance, &done, control)
-        };
+        let solve =
+            |cones: &Cones| tiles::solve(&field, cones, &seeds, self.tolerance, &done, control);
         let mut solution = solve(&cones)?;
         if solution.is_none() && !cones.is_empty() {
             cones = Cones::default();
@@ -119,8 +109,7 @@ impl Solver {
         })?;
         let mut errors = None;
         if self.accuracy == Accuracy::High {
-            let correction =
-                correction::correct(&field, &cones, &values.tiles, &fixed, control)?;
+            let correction = correction::correct(&field, &cones, &values.tiles, &seeds, control)?;
             values.add(&correction.values);
             errors = Some(correction.errors);
         }

@@ -1,9 +1,12 @@
 //! The slow and obviously right solver: judge of the tests.
 
+use glam::DVec2;
+
 use super::cone::Cones;
 use super::field::TensorField;
 use super::source::StartRegion;
 use super::tiles::Values;
+use super::update::{RING, ceiling};
 use super::{DistanceMap, Statistics, best_foot};
 use crate::{Control, Error, Result};
 
@@ -17,8 +20,8 @@ const MOST_SWEEPS: usize = 2000;
 /// Cancelled.
 pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Result<DistanceMap> {
     let cones = Cones::new(&field, start);
-    let mut values = Values::unreached(&field);
-    start.seed(&field, |col, row, value| values.lower(col, row, value as f32));
+    let seeds = start.seeds(&field);
+    let mut values = Values::seeded(&field, &seeds);
     let (cols, rows) = (field.cols(), field.rows());
     let mut changed = true;
     let mut sweep = 0;
@@ -32,7 +35,9 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
                 let old = values.get(col, row);
                 let new = best_foot(&field, &cones, &values, col, row)
                     .map_or(f32::INFINITY, |(g, _)| g as f32);
-                if new < old {
+                let (tile, place) = field.tiling.place(col, row);
+                let seed = seeds[tile].as_ref().map_or(f32::INFINITY, |seeds| seeds[place]);
+                if new < old.min(ceiling(seed, shortest(&field, col, row))) {
                     values.lower(col, row, new);
                     changed = true;
                 }
@@ -53,5 +58,13 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
         statistics,
         unit: "",
         frame: None,
+    })
+}
+
+/// Length of the shortest step from an open node to its ring.
+fn shortest(field: &TensorField, col: usize, row: usize) -> f32 {
+    let metric = field.metric(col, row).unwrap_or_default();
+    RING.iter().fold(f32::INFINITY, |least, &(i, j)| {
+        least.min(metric.norm(DVec2::new(i.into(), j.into())) as f32)
     })
 }

@@ -3,9 +3,12 @@
 use glam::DVec2;
 
 use super::cone::Cone;
-use super::field::TensorField;
+use super::field::{AREA, TensorField};
 use super::update::segment;
 use crate::Sym2;
+
+/// Values that a tile's nodes have from the start, infinite where none.
+pub(super) type Seeds = [f32; AREA];
 
 /// Where distance is zero, in grid coordinates (column, row).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,8 +53,20 @@ impl StartRegion {
         })
     }
 
+    /// Start values of the tiles that have some.
+    pub(super) fn seeds(&self, field: &TensorField) -> Vec<Option<Box<Seeds>>> {
+        let mut seeds = vec![None; field.tiling.tiles()];
+        self.seed(field, |col, row, value| {
+            let (tile, place) = field.tiling.place(col, row);
+            let seeds: &mut Box<Seeds> =
+                seeds[tile].get_or_insert_with(|| Box::new([f32::INFINITY; AREA]));
+            seeds[place] = seeds[place].min(value as f32);
+        });
+        seeds
+    }
+
     /// Start values in stored units: calls `set(col, row, value)` for nodes on and near the region.
-    pub(super) fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
+    fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
         for (at, sides) in self.corners() {
             let Some(cone) = Cone::new(field, at, sides) else { continue };
             near(field, at, at, POINT_RADIUS, |col, row, node| {

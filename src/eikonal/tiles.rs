@@ -11,6 +11,7 @@
 use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
+use super::source::Seeds;
 use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Tile, UNREACHED};
 use crate::{Control, Result};
 
@@ -22,11 +23,18 @@ pub(crate) struct Values {
 }
 
 impl Values {
-    pub(crate) fn unreached(field: &TensorField) -> Self {
+    /// The start values; the rest unreached.
+    pub(crate) fn seeded(field: &TensorField, seeds: &[Option<Box<Seeds>>]) -> Self {
         let fill = |tensors: &super::field::TensorTile| {
             tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY })
         };
-        Self { tiling: field.tiling, tiles: field.tiles.iter().map(fill).collect() }
+        let mut tiles: Vec<[f32; AREA]> = field.tiles.iter().map(fill).collect();
+        for (tile, seeds) in tiles.iter_mut().zip(seeds) {
+            for (value, seed) in tile.iter_mut().zip(seeds.iter().flat_map(|seeds| seeds.iter())) {
+                *value = value.min(*seed);
+            }
+        }
+        Self { tiling: field.tiling, tiles }
     }
 
     pub(crate) fn get(&self, col: usize, row: usize) -> f32 {
@@ -234,13 +242,14 @@ struct Shared {
 pub(super) fn solve(
     field: &TensorField,
     cones: &Cones,
-    values: Values,
+    seeds: &[Option<Box<Seeds>>],
     tolerance: f32,
     done: &dyn Fn(&dyn Fn(usize, usize) -> bool) -> bool,
     control: &Control,
 ) -> Result<Option<(Values, Statistics)>> {
     let tiling = field.tiling;
     let mut queue = Queue::new(tiling.tiles());
+    let values = Values::seeded(field, seeds);
     wake_start(field, &values, &mut queue);
     let window = WINDOW_CELLS * field.mean_step;
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
@@ -248,7 +257,12 @@ pub(super) fn solve(
     let mut statistics = Statistics::default();
     let shared = Shared { values, queue, taken: Vec::new() };
     let work = |bench: &mut Workbench, shared: &Shared, index: usize, outcome: &mut Outcome| {
-        bench.solve(field, cones, shared, shared.taken[index] as usize, tolerance, outcome);
+        let tile = shared.taken[index] as usize;
+        let first = tiling.first(tile);
+        let cone = cones.of_tile(tile).map(|(cone, alike)| (cone, alike, first));
+        let input =
+            Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
+        bench.solve(&tiling, &input, shared, tile, outcome);
     };
     let lead =
         |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = &Outcome>| -> Result<usize> {
@@ -347,16 +361,12 @@ impl Workbench {
     /// Sweeps a tile until it stands still: in the direction of the news and back, then across it and back.
     fn solve(
         &mut self,
-        field: &TensorField,
-        cones: &Cones,
+        tiling: &Tiling,
+        input: &Tile<'_>,
         shared: &Shared,
         tile: usize,
-        tolerance: f32,
         outcome: &mut Outcome,
     ) {
-        let first = field.tiling.first(tile);
-        let cone = cones.of_tile(tile).map(|(cone, alike)| (cone, alike, first));
-        let input = Tile { tensors: &field.tiles[tile], cone, tolerance };
         shared.values.block(tile, &mut self.block);
         self.bench.load(&self.block);
         // Sweeps run away from the news.
@@ -372,7 +382,7 @@ impl Workbench {
             let side = usize::from(by_columns);
             let dirty = owed[side] | changes[side];
             if dirty != 0 {
-                changes = self.bench.sweep(&input, by_columns, descending[side], dirty);
+                changes = self.bench.sweep(input, by_columns, descending[side], dirty);
                 owed[side] = 0;
                 outcome.sweeps += 1;
                 outcome.changed |= changes != [0; 2];
@@ -386,13 +396,13 @@ impl Workbench {
             for (row, line) in outcome.values.chunks_exact_mut(SIDE).enumerate() {
                 line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
             }
-            self.wakes(field, shared, tile, &mut outcome.wakes);
+            self.wakes(tiling, shared, tile, &mut outcome.wakes);
         }
     }
 
     /// The least changed values that could improve a neighbour. A node `x` can be improved by a neighbour `y` only if
     /// `g(y) < g(x) + slack`.
-    fn wakes(&self, field: &TensorField, shared: &Shared, tile: usize, wakes: &mut [f32; 8]) {
+    fn wakes(&self, tiling: &Tiling, shared: &Shared, tile: usize, wakes: &mut [f32; 8]) {
         const LAST: usize = SIDE - 1;
         let before = &shared.values.tiles[tile];
         // News at the borders, with one place before and after.
@@ -401,7 +411,7 @@ impl Workbench {
             if old - new > ROUNDING * new { new } else { f32::INFINITY }
         };
         let slack = |(dx, dy): (isize, isize)| {
-            neighbour(&field.tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
+            neighbour(tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
         };
         let improves = |new: f32, old: f32, slack: f32| {
             if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }

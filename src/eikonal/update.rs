@@ -22,6 +22,7 @@ use multiversion::multiversion;
 
 use super::cone::Cone;
 use super::field::{SIDE, TensorTile};
+use super::source::Seeds;
 use crate::Sym2;
 
 /// Value of a node that no front has reached. Far above any distance, and its square still a finite `f32`.
@@ -70,27 +71,29 @@ const BLOCK: usize = SIDE + 2;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coefficients {
     /// `1/s`, `det D/s²` and `β/s` for triangles along x, then along y; `β` changes its sign in the other two quadrants.
-    ix: [f32; SIDE],
-    ex: [f32; SIDE],
-    bx: [f32; SIDE],
-    iy: [f32; SIDE],
-    ey: [f32; SIDE],
-    by: [f32; SIDE],
+    pub(super) ix: [f32; SIDE],
+    pub(super) ex: [f32; SIDE],
+    pub(super) bx: [f32; SIDE],
+    pub(super) iy: [f32; SIDE],
+    pub(super) ey: [f32; SIDE],
+    pub(super) by: [f32; SIDE],
     /// `hi` along x and y; with the other sign in the other two quadrants.
-    hx: [f32; SIDE],
-    hy: [f32; SIDE],
+    pub(super) hx: [f32; SIDE],
+    pub(super) hy: [f32; SIDE],
     /// `lo` of the triangles with a diagonal (1,1) along x and y, then with (1,−1).
-    rx: [f32; SIDE],
-    ry: [f32; SIDE],
-    fx: [f32; SIDE],
-    fy: [f32; SIDE],
+    pub(super) rx: [f32; SIDE],
+    pub(super) ry: [f32; SIDE],
+    pub(super) fx: [f32; SIDE],
+    pub(super) fy: [f32; SIDE],
     /// Lengths of the steps (1,0), (0,1), (1,1), (1,−1).
-    east: [f32; SIDE],
-    south: [f32; SIDE],
+    pub(super) east: [f32; SIDE],
+    pub(super) south: [f32; SIDE],
     pub(super) rising: [f32; SIDE],
     pub(super) falling: [f32; SIDE],
     /// A change below this is no reason to go on.
-    tolerance: [f32; SIDE],
+    pub(super) tolerance: [f32; SIDE],
+    /// The node is only lowered to below this: infinite but for nodes of the start.
+    pub(super) ceiling: [f32; SIDE],
 }
 
 impl Coefficients {
@@ -113,6 +116,7 @@ impl Coefficients {
         rising: [f32::INFINITY; SIDE],
         falling: [f32::INFINITY; SIDE],
         tolerance: [f32::INFINITY; SIDE],
+        ceiling: [f32::INFINITY; SIDE],
     };
 }
 
@@ -238,6 +242,7 @@ pub(crate) struct Tile<'a> {
     /// Cone that the tile lies in, whether it is to be taken out of all nodes, and the first node.
     pub(crate) cone: Option<(&'a Cone, bool, DVec2)>,
     pub(crate) tolerance: f32,
+    pub(crate) seeds: Option<&'a Seeds>,
 }
 
 /// How to sweep.
@@ -275,7 +280,13 @@ pub(super) fn tensors(tile: &Tile<'_>, line: usize, how: How) -> [[f32; SIDE]; 3
 /// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
 /// tensor would be lost in the rounding of xx·yy − xy².
 #[inline(always)]
-pub(super) fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficients, limits: &mut Limits) {
+pub(super) fn prepare(
+    tile: &Tile<'_>,
+    line: usize,
+    how: How,
+    k: &mut Coefficients,
+    limits: &mut Limits,
+) {
     let [xxs, xys, dets] = tensors(tile, line, how);
     let mut slack = [0f32; SIDE];
     let mut longest = [0f32; SIDE];
@@ -308,6 +319,7 @@ pub(super) fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficien
         k.rising[i] = choose(open, rising, f32::INFINITY);
         k.falling[i] = choose(open, falling, f32::INFINITY);
         k.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
+        k.ceiling[i] = f32::INFINITY;
         let obtuse = greatest(
             greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
             greatest(
@@ -317,6 +329,13 @@ pub(super) fn prepare(tile: &Tile<'_>, line: usize, how: How, k: &mut Coefficien
         );
         slack[i] = choose(open, obtuse, 0.0);
         longest[i] = choose(open, greatest(rising, falling), 0.0);
+    }
+    if let Some(seeds) = tile.seeds {
+        for i in 0..SIDE {
+            let place = if how.by_columns { i * SIDE + line } else { line * SIDE + i };
+            let shortest = least(least(k.east[i], k.south[i]), least(k.rising[i], k.falling[i]));
+            k.ceiling[i] = ceiling(seeds[place], shortest);
+        }
     }
     for i in 0..SIDE {
         limits.slack = greatest(limits.slack, slack[i]);
@@ -353,20 +372,6 @@ pub(super) fn lanes(line: &[f32], shift: usize) -> [f32; SIDE] {
 #[inline(always)]
 pub(super) fn pass(diagonal: f32, a: f32, b: f32) -> f32 {
     if least(a, b) < f32::INFINITY { diagonal } else { f32::INFINITY }
-}
-
-/// What a triangle needs: `lo`, `hi`, `1/s`, `det D/s²`, `β/s`.
-pub(super) type Shape = [f32; 5];
-
-/// The shapes along x and y with a rising diagonal, then with a falling one.
-#[inline(always)]
-pub(super) fn shapes(k: &Coefficients, i: usize) -> [Shape; 4] {
-    [
-        [k.rx[i], k.hx[i], k.ix[i], k.ex[i], k.bx[i]],
-        [k.ry[i], k.hy[i], k.iy[i], k.ey[i], k.by[i]],
-        [k.fx[i], -k.hx[i], k.ix[i], k.ex[i], -k.bx[i]],
-        [k.fy[i], -k.hy[i], k.iy[i], k.ey[i], -k.by[i]],
-    ]
 }
 
 /// One triangle: the value through the segment from axis neighbour `a` to diagonal neighbour `b`; where the least over
@@ -429,6 +434,14 @@ pub(super) fn prepare_shifts(
     for i in 0..SIDE {
         limits.shift = greatest(limits.shift, largest[i]);
     }
+}
+
+/// What a node of the start has to be lowered to below, if ever. The values near the start are of second order, the update is
+/// only of first and may lie below them; one that is lower by half a step is from another start. Infinite
+/// for other nodes.
+#[inline(always)]
+pub(super) fn ceiling(seed: f32, shortest_step: f32) -> f32 {
+    choose(seed < UNREACHED, seed - 0.5 * shortest_step, f32::INFINITY)
 }
 
 /// See [`Bench::sweep`]. No fused multiply-add, so every instruction set gives the same bits.
@@ -536,10 +549,10 @@ fn sweep_lines<const IN_CONE: bool>(
             let u = least(least(rising, falling), edges);
             let floor = ROUNDING * u;
             let significant = greatest(k.tolerance[i], floor);
-            let news = u32::from(old[i] - u > significant);
+            let news = u32::from((old[i] - u > significant) & (u < k.ceiling[i]));
             changed[i] |= news;
             any |= news;
-            new[i] = least(u, old[i]);
+            new[i] = choose(u < least(old[i], k.ceiling[i]), u, old[i]);
         }
         values[row + 1][1..=SIDE].copy_from_slice(&new);
         if any != 0 {
