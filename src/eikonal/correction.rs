@@ -29,7 +29,7 @@ use super::field::{AREA, SIDE, TensorField, Tiling};
 use super::source::Seeds;
 use super::tiles::{Queue, WINDOW_CELLS};
 use super::update::{
-    How, Limits, Prepared, RING, ROUNDING, Tile, UNREACHED, choose, greatest, lanes, least, pass,
+    ALL, How, Limits, Lines, Prepared, RING, ROUNDING, Tile, UNREACHED, around, choose, greatest, lanes, least, pass,
     prepare, prepare_shifts, tensors,
 };
 use crate::{Control, Result};
@@ -152,16 +152,10 @@ struct Input<'a> {
 }
 
 /// Room to find the feet of a tile.
+#[derive(Default)]
 struct Bench {
     prepared: Prepared,
-    limits: Limits,
-    lines: Lines,
-}
-
-impl Default for Bench {
-    fn default() -> Self {
-        Self { prepared: Prepared::default(), limits: Limits::default(), lines: Lines::default() }
-    }
+    line: Line,
 }
 
 impl Bench {
@@ -175,42 +169,49 @@ impl Bench {
         }
         let g = patch(tiling, tile, f32::INFINITY, |t| &input.values[t]);
         let e = patch(tiling, tile, 0.0, |t| &input.total[t]);
-        let d = [
+        let mut metric = [
             patch(tiling, tile, 0.0, |t| &field.tiles[t].xx),
             patch(tiling, tile, 0.0, |t| &field.tiles[t].xy),
             patch(tiling, tile, 0.0, |t| &field.tiles[t].det),
         ];
+        invert(&mut metric);
         let cone = input.cones.of_tile(tile).map(|(cone, alike)| (cone, alike, tiling.first(tile)));
         let seeds = input.seeds[tile].as_deref();
         let this = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
-        let how = How { by_columns: false, descending: false };
         for row in 0..SIDE {
-            prepare(&this, row, how, &mut self.prepared.lines[row], &mut self.limits);
-            if cone.is_some() {
-                let shifts = &mut self.prepared.shifts[row];
-                prepare_shifts(&this, row, how, shifts, &mut self.limits);
-            } else {
-                self.prepared.shifts[row] = [[0.0; SIDE]; 8];
-            }
-            find_triangles(&self.prepared, &g, &e, row, &mut self.lines);
-            gather(&g, &e, &d, row, &mut self.lines);
-            minimise(&this, row, &self.prepared, &mut self.lines);
-            for i in 0..SIDE {
-                let place = row * SIDE + i;
-                if input.values[tile][place] < UNREACHED
-                    && seeds.is_none_or(|seeds| seeds[place] >= UNREACHED)
-                {
-                    let triangle = self.lines.triangle[i] as usize;
-                    feet.triangle[place] = triangle as u8;
-                    feet.theta[place] = self.lines.theta[i];
-                    feet.rho[place] = self.lines.rho[i];
-                    let (a, b) = TRIANGLES[triangle];
-                    feet.reads |= outside(i, row, a, 1.0 - self.lines.theta[i]);
-                    feet.reads |= outside(i, row, b, self.lines.theta[i]);
-                }
+            find_triangles(&this, &mut self.prepared, &g, &e, row, &mut self.line);
+            gather(&g, &e, &metric, row, &mut self.line);
+            minimise(&this, row, &self.prepared, &mut self.line);
+            let places = row * SIDE..(row + 1) * SIDE;
+            feet.theta[places.clone()].copy_from_slice(&self.line.theta);
+            feet.rho[places.clone()].copy_from_slice(&self.line.rho);
+            for (triangle, from) in feet.triangle[places].iter_mut().zip(self.line.triangle) {
+                *triangle = from as u8;
             }
         }
+        for place in 0..AREA {
+            let seeded = seeds.is_some_and(|seeds| seeds[place] < UNREACHED);
+            if seeded || input.values[tile][place] >= UNREACHED {
+                (feet.triangle[place], feet.theta[place], feet.rho[place]) = (FIXED, 0.0, 0.0);
+            }
+        }
+        feet.find_reads();
         feet
+    }
+}
+
+impl Feet {
+    fn find_reads(&mut self) {
+        const LAST: usize = SIDE - 1;
+        for place in 0..AREA {
+            let (row, col) = (place / SIDE, place % SIDE);
+            let inside = (1..LAST).contains(&row) && (1..LAST).contains(&col);
+            if !inside && self.triangle[place] != FIXED {
+                let (a, b) = TRIANGLES[self.triangle[place] as usize];
+                self.reads |= outside(col, row, a, 1.0 - self.theta[place]);
+                self.reads |= outside(col, row, b, self.theta[place]);
+            }
+        }
     }
 }
 
@@ -227,7 +228,7 @@ fn outside(col: usize, row: usize, k: usize, weight: f32) -> u8 {
 
 /// Intermediate results of a line of a tile.
 #[derive(Default)]
-struct Lines {
+struct Line {
     triangle: [u32; SIDE],
     /// Difference `g(b) − g(a)` as the first-order update reads it, and the foot that follows.
     slope: [f32; SIDE],
@@ -236,7 +237,7 @@ struct Lines {
     /// `g + e` at `a`, `b`, `2a − b`, `2b − a` less that at the node; a large value where unreached.
     rise: [[f32; SIDE]; 4],
     /// `M` at `a` and `b`: xx, xy, yy; xx is 0 where closed.
-    metric: [[[f32; SIDE]; 3]; 2],
+    metric: [[f32; SIDE]; 6],
     /// `a` and `b − a` from the node.
     a: [[f32; SIDE]; 2],
     w: [[f32; SIDE]; 2],
@@ -248,7 +249,21 @@ struct Lines {
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn find_triangles(prepared: &Prepared, g: &Patch, e: &Patch, row: usize, lines: &mut Lines) {
+fn find_triangles(
+    tile: &Tile<'_>,
+    prepared: &mut Prepared,
+    g: &Patch,
+    e: &Patch,
+    row: usize,
+    line: &mut Line,
+) {
+    let how = How { by_columns: false, descending: false };
+    let mut limits = Limits::default();
+    prepare(tile, row, how, &mut prepared.lines[row], &mut limits);
+    prepared.shifts[row] = [[0.0; SIDE]; 8];
+    if tile.cone.is_some() {
+        prepare_shifts(tile, row, how, &mut prepared.shifts[row], &mut limits);
+    }
     let k = &prepared.lines[row];
     let mut ring = [[0f32; SIDE]; 8];
     for (n, ring) in ring.iter_mut().enumerate() {
@@ -280,8 +295,8 @@ fn find_triangles(prepared: &Prepared, g: &Patch, e: &Patch, row: usize, lines: 
     best.offer(5, w, sw, across_x);
     best.offer(6, s, sw, across_y);
     best.offer(7, n, ne, across_y);
-    lines.triangle = best.triangle;
-    lines.slope = best.slope;
+    line.triangle = best.triangle;
+    line.slope = best.slope;
 }
 
 type Lanes = [f32; SIDE];
@@ -326,36 +341,84 @@ impl Best {
     }
 }
 
-/// What the functional needs from around each node's foot.
-fn gather(g: &Patch, e: &Patch, d: &[Patch; 3], row: usize, lines: &mut Lines) {
-    for i in 0..SIDE {
-        let (col, row) = (i + MARGIN, row + MARGIN);
-        let (a, b) = TRIANGLES[(lines.triangle[i] & 7) as usize];
-        let ((ax, ay), (bx, by)) = (RING[a], RING[b]);
-        let (wx, wy) = (bx - ax, by - ay);
-        let (gx, ex) = (g[row][col], e[row][col]);
-        let at = |dx: i32, dy: i32| ((row as i32 + dy) as usize, (col as i32 + dx) as usize);
-        for (n, (dx, dy)) in
-            [(ax, ay), (bx, by), (ax - wx, ay - wy), (bx + wx, by + wy)].into_iter().enumerate()
-        {
-            let (r, c) = at(dx, dy);
-            lines.rise[n][i] = (g[r][c] - gx) + (e[r][c] - ex);
+/// `M = D⁻¹` as xx, xy, yy from `D` as xx, xy, det; xx is 0 where closed.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn invert(d: &mut [Patch; 3]) {
+    let [xx, xy, det] = d;
+    for row in 0..WIDE {
+        for i in 0..WIDE {
+            let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], det[row][i]);
+            let (open, idet) = (ddet > 0.0, 1.0 / ddet);
+            xx[row][i] = choose(open, (ddet + dxy * dxy) / dxx * idet, 0.0);
+            xy[row][i] = choose(open, -dxy * idet, 0.0);
+            det[row][i] = choose(open, dxx * idet, 0.0);
         }
-        for (n, (dx, dy)) in [(ax, ay), (bx, by)].into_iter().enumerate() {
-            let (r, c) = at(dx, dy);
-            let [xx, xy, det] = [d[0][r][c], d[1][r][c], d[2][r][c]];
-            let m = if det > 0.0 {
-                [(det + xy * xy) / (xx * det), -xy / det, xx / det]
-            } else {
-                [0.0; 3]
-            };
-            for (all, one) in lines.metric[n].iter_mut().zip(m) {
-                all[i] = one;
-            }
-        }
-        (lines.a[0][i], lines.a[1][i]) = (ax as f32, ay as f32);
-        (lines.w[0][i], lines.w[1][i]) = (wx as f32, wy as f32);
     }
+}
+
+/// A line of a patch, seen `(dx, dy)` from the nodes of a row.
+#[inline(always)]
+fn seen(patch: &Patch, row: usize, dx: i32, dy: i32) -> Lanes {
+    lanes(&patch[(row as i32 + dy) as usize + MARGIN], (dx + MARGIN as i32) as usize)
+}
+
+/// How much higher than the nodes of a row those at `(dx, dy)` from them are.
+#[inline(always)]
+fn rise(g: &Patch, e: &Patch, row: usize, dx: i32, dy: i32) -> Lanes {
+    let (g0, e0) = (seen(g, row, 0, 0), seen(e, row, 0, 0));
+    let (g1, e1) = (seen(g, row, dx, dy), seen(e, row, dx, dy));
+    let mut rise = [0f32; SIDE];
+    for i in 0..SIDE {
+        rise[i] = (g1[i] - g0[i]) + (e1[i] - e0[i]);
+    }
+    rise
+}
+
+/// What the functional needs from around each node's foot.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn gather(g: &Patch, e: &Patch, metric: &[Patch; 3], row: usize, line: &mut Line) {
+    let triangle = line.triangle;
+    let (mut rises, mut metrics) = ([[0f32; SIDE]; 4], [[0f32; SIDE]; 6]);
+    let (mut a, mut w) = ([[0f32; SIDE]; 2], [[0f32; SIDE]; 2]);
+    for t in 0..8 {
+        let (axis, diagonal) = TRIANGLES[t];
+        let ((ax, ay), (bx, by)) = (RING[axis], RING[diagonal]);
+        let (wx, wy) = (bx - ax, by - ay);
+        blend(t, triangle, rise(g, e, row, ax, ay), &mut rises[0]);
+        blend(t, triangle, rise(g, e, row, bx, by), &mut rises[1]);
+        blend(t, triangle, rise(g, e, row, ax - wx, ay - wy), &mut rises[2]);
+        blend(t, triangle, rise(g, e, row, bx + wx, by + wy), &mut rises[3]);
+        for n in 0..3 {
+            blend(t, triangle, seen(&metric[n], row, ax, ay), &mut metrics[n]);
+            blend(t, triangle, seen(&metric[n], row, bx, by), &mut metrics[3 + n]);
+        }
+        blend(t, triangle, [ax as f32; SIDE], &mut a[0]);
+        blend(t, triangle, [ay as f32; SIDE], &mut a[1]);
+        blend(t, triangle, [wx as f32; SIDE], &mut w[0]);
+        blend(t, triangle, [wy as f32; SIDE], &mut w[1]);
+    }
+    line.rise = rises;
+    line.metric = metrics;
+    line.a = a;
+    line.w = w;
+}
+
+/// Takes the lanes of triangle `t`.
+#[inline(always)]
+fn blend(t: usize, triangle: [u32; SIDE], from: Lanes, to: &mut Lanes) {
+    let (old, mut new) = (*to, [0f32; SIDE]);
+    for i in 0..SIDE {
+        new[i] = choose(triangle[i] == t as u32, from[i], old[i]);
+    }
+    *to = new;
 }
 
 /// `vᵀMv` along a segment, `α + 2βθ + γθ²`.
@@ -390,7 +453,7 @@ impl Quadratic {
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, lines: &mut Lines) {
+fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, line: &mut Line) {
     let how = How { by_columns: false, descending: false };
     let [dxx, dxy, ddet] = tensors(tile, row, how);
     let shifts = &prepared.shifts[row];
@@ -408,10 +471,10 @@ fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, lines: &mut Lines)
             on[i] = choose(shift[i] < 0.0, 1.0, on[i]);
         }
     }
-    let [ra, rb, rc, rd] = lines.rise;
-    let [[axx, axy, ayy], [bxx, bxy, byy]] = lines.metric;
-    let ([ax, ay], [wx, wy]) = (lines.a, lines.w);
-    let slopes = lines.slope;
+    let [ra, rb, rc, rd] = line.rise;
+    let [axx, axy, ayy, bxx, bxy, byy] = line.metric;
+    let ([ax, ay], [wx, wy]) = (line.a, line.w);
+    let slopes = line.slope;
     let (mut theta, mut rho) = ([0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
         let idet = 1.0 / ddet[i];
@@ -427,8 +490,8 @@ fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, lines: &mut Lines)
         };
         (theta[i], rho[i]) = local.minimise([ra[i], rb[i], rc[i], rd[i]], slopes[i]);
     }
-    lines.theta = theta;
-    lines.rho = rho;
+    line.theta = theta;
+    line.rho = rho;
 }
 
 /// The cone seen from a node at `v` from its point, times `on`.
@@ -632,23 +695,22 @@ fn carry(
             }
         }
     }
-    let mut largest = 0f32;
     let mut sweeps = 0;
-    let mut change = f32::INFINITY;
-    while change > tolerance && sweeps < MOST_SWEEPS {
-        change = carry_once(&mut block, &weights, &feet.rho, sweeps % 2 == 1);
-        largest = largest.max(change);
+    let mut dirty = ALL;
+    outcome.changed = false;
+    while dirty != 0 && sweeps < MOST_SWEEPS {
+        dirty = carry_once(&mut block, &weights, &feet.rho, tolerance, sweeps % 2 == 1, dirty);
+        outcome.changed |= dirty != 0;
         sweeps += 1;
     }
-    outcome.settled = change <= tolerance;
-    outcome.changed = largest > tolerance;
+    outcome.settled = dirty == 0;
     let new = outcome.e.get_or_insert_with(|| Box::new([0.0; AREA]));
     for (row, line) in new.chunks_exact_mut(SIDE).enumerate() {
         line.copy_from_slice(&block[row + MARGIN][MARGIN..MARGIN + SIDE]);
     }
 }
 
-/// One sweep over the rows; the largest change.
+/// One sweep over the rows in `dirty`; the rows next to which something changed by more than `tolerance`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -658,25 +720,33 @@ fn carry_once(
     block: &mut Patch,
     weights: &[[[f32; SIDE]; 8]; SIDE],
     rho: &[f32; AREA],
+    tolerance: f32,
     descending: bool,
-) -> f32 {
-    let mut largest = [0f32; SIDE];
+    mut dirty: Lines,
+) -> Lines {
     for step in 0..SIDE {
         let row = if descending { SIDE - 1 - step } else { step };
+        if dirty & 1 << row == 0 {
+            continue;
+        }
+        dirty &= !(1 << row);
         let mut new = lanes(rho, row * SIDE);
         for n in 0..8 {
             let (dx, dy) = RING[n];
-            let at = (row as i32 + dy) as usize + MARGIN;
-            let e = lanes(&block[at], (dx + MARGIN as i32) as usize);
+            let e = seen(block, row, dx, dy);
             for i in 0..SIDE {
                 new[i] += weights[row][n][i] * e[i];
             }
         }
-        let old = lanes(&block[row + MARGIN], MARGIN);
+        let old = seen(block, row, 0, 0);
+        let mut changed = 0;
         for i in 0..SIDE {
-            largest[i] = greatest(largest[i], (new[i] - old[i]).abs());
+            changed |= u32::from((new[i] - old[i]).abs() > tolerance);
         }
         block[row + MARGIN][MARGIN..MARGIN + SIDE].copy_from_slice(&new);
+        if changed != 0 {
+            dirty |= around(row);
+        }
     }
-    largest.into_iter().fold(0.0, f32::max)
+    dirty
 }

@@ -254,7 +254,7 @@ pub(super) struct How {
 
 /// A line and the ones beside it.
 #[inline(always)]
-fn around(line: usize) -> Lines {
+pub(super) fn around(line: usize) -> Lines {
     ((0b111 << line) >> 1) & ALL
 }
 
