@@ -39,8 +39,9 @@ use crate::{Control, Result};
 const ROUNDS: usize = 2;
 /// Newton steps from the first-order foot to that of the functional.
 const NEWTON_STEPS: usize = 2;
-/// The transport stands still when nothing changes by more than this many mean cells.
-const TOLERANCE_CELLS: f32 = 1e-5;
+/// The transport of a round stands still when nothing changes by more than this many mean cells. What the first leaves
+/// undone the second sees.
+const TOLERANCE_CELLS: [f32; ROUNDS] = [1e-4, 1e-5];
 /// Sweeps over a tile before it goes back into the queue, and times it may come back.
 const MOST_SWEEPS: usize = 40;
 const MOST_ACTIVATIONS: u32 = 40;
@@ -52,6 +53,7 @@ pub(super) struct Correction {
 }
 
 /// Where the values of a tile's nodes come from, and what the functional of second order adds there.
+#[derive(Clone)]
 struct Feet {
     /// Index into [`TRIANGLES`]; [`FIXED`] for a node that is not corrected.
     triangle: [u8; AREA],
@@ -114,16 +116,15 @@ pub(super) fn correct(
     let tiles = field.tiling.tiles();
     let mut total = vec![[0f32; AREA]; tiles];
     let mut last = Vec::new();
-    for _ in 0..ROUNDS {
-        let feet = (0..tiles)
-            .into_par_iter()
-            .map_init(Bench::default, |bench, tile| {
-                control.check()?;
-                let input = Input { field, cones, values, total: &total, seeds };
-                Ok(bench.feet(&input, tile))
-            })
-            .collect::<Result<Vec<Feet>>>()?;
-        last = transport(field, values, &feet, control)?;
+    let mut feet = vec![Feet::NONE; tiles];
+    for tolerance in TOLERANCE_CELLS {
+        let input = Input { field, cones, values, total: &total, seeds };
+        feet.par_iter_mut().enumerate().try_for_each_init(Bench::default, |bench, (tile, feet)| {
+            control.check()?;
+            bench.find(&input, tile, feet);
+            Ok(())
+        })?;
+        last = transport(field, values, &feet, tolerance * field.mean_step, control)?;
         total.par_iter_mut().zip(&last).for_each(|(total, last)| {
             total.iter_mut().zip(last).for_each(|(total, last)| *total += last);
         });
@@ -159,13 +160,12 @@ struct Bench {
 }
 
 impl Bench {
-    fn feet(&mut self, input: &Input<'_>, tile: usize) -> Feet {
+    fn find(&mut self, input: &Input<'_>, tile: usize, feet: &mut Feet) {
         let field = input.field;
         let tiling = &field.tiling;
-        let mut feet =
-            Feet { triangle: [FIXED; AREA], theta: [0.0; AREA], rho: [0.0; AREA], reads: 0 };
+        *feet = Feet::NONE;
         if input.values[tile].iter().all(|&g| g >= UNREACHED) {
-            return feet;
+            return;
         }
         let g = patch(tiling, tile, f32::INFINITY, |t| &input.values[t]);
         let e = patch(tiling, tile, 0.0, |t| &input.total[t]);
@@ -181,7 +181,12 @@ impl Bench {
         for row in 0..SIDE {
             find_triangles(&this, &mut self.prepared, &g, &e, row, &mut self.line);
             gather(&g, &e, &metric, row, &mut self.line);
-            minimise(&this, row, &self.prepared, &mut self.line);
+            let shifts = &self.prepared.shifts[row];
+            if cone.is_some() {
+                minimise_in_cone(&this, row, shifts, &mut self.line);
+            } else {
+                minimise(&this, row, shifts, &mut self.line);
+            }
             let places = row * SIDE..(row + 1) * SIDE;
             feet.theta[places.clone()].copy_from_slice(&self.line.theta);
             feet.rho[places.clone()].copy_from_slice(&self.line.rho);
@@ -196,11 +201,13 @@ impl Bench {
             }
         }
         feet.find_reads();
-        feet
     }
 }
 
 impl Feet {
+    const NONE: Self =
+        Self { triangle: [FIXED; AREA], theta: [0.0; AREA], rho: [0.0; AREA], reads: 0 };
+
     fn find_reads(&mut self) {
         const LAST: usize = SIDE - 1;
         for place in 0..AREA {
@@ -215,15 +222,12 @@ impl Feet {
     }
 }
 
-/// The neighbouring tile, if any, that holds the ring's place `k` of a node.
+/// The neighbouring tile, if any, that holds the ring's place `k` of a node, as a bit.
 fn outside(col: usize, row: usize, k: usize, weight: f32) -> u8 {
-    const LAST: i32 = SIDE as i32 - 1;
-    let side = |x: i32| i32::from(x > LAST) - i32::from(x < 0);
-    let step = (side(col as i32 + RING[k].0), side(row as i32 + RING[k].1));
-    match RING.iter().position(|&place| place == step) {
-        Some(neighbour) if weight > 0.0 => 1 << neighbour,
-        _ => 0,
-    }
+    /// Bits of the places in [`RING`], by row and column from −1.
+    const BITS: [[u8; 3]; 3] = [[1 << 5, 1 << 6, 1 << 7], [1 << 4, 0, 1], [1 << 3, 1 << 2, 1 << 1]];
+    let side = |at: usize, by: i32| (at as i32 + by + SIDE as i32) as usize / SIDE;
+    if weight > 0.0 { BITS[side(row, RING[k].1)][side(col, RING[k].0)] } else { 0 }
 }
 
 /// Intermediate results of a line of a tile.
@@ -453,10 +457,29 @@ impl Quadratic {
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, line: &mut Line) {
+fn minimise(tile: &Tile<'_>, row: usize, shifts: &[Lanes; 8], line: &mut Line) {
+    minimise_line::<false>(tile, row, shifts, line);
+}
+
+/// The same in a tile that lies in a cone.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn minimise_in_cone(tile: &Tile<'_>, row: usize, shifts: &[Lanes; 8], line: &mut Line) {
+    minimise_line::<true>(tile, row, shifts, line);
+}
+
+#[inline(always)]
+fn minimise_line<const IN_CONE: bool>(
+    tile: &Tile<'_>,
+    row: usize,
+    shifts: &[Lanes; 8],
+    line: &mut Line,
+) {
     let how = How { by_columns: false, descending: false };
     let [dxx, dxy, ddet] = tensors(tile, row, how);
-    let shifts = &prepared.shifts[row];
     let (m0, from) = match tile.cone {
         Some((cone, _, first)) => (
             [cone.metric.xx as f32, cone.metric.xy as f32, cone.metric.yy as f32],
@@ -488,7 +511,7 @@ fn minimise(tile: &Tile<'_>, row: usize, prepared: &Prepared, line: &mut Line) {
             at_b: choose3(bxx[i] > 0.0, [bxx[i], bxy[i], byy[i]], m),
             cone: ConeAt::new(on[i], m0, [from[0] + i as f32, from[1]]),
         };
-        (theta[i], rho[i]) = local.minimise([ra[i], rb[i], rc[i], rd[i]], slopes[i]);
+        (theta[i], rho[i]) = local.minimise::<IN_CONE>([ra[i], rb[i], rc[i], rd[i]], slopes[i]);
     }
     line.theta = theta;
     line.rho = rho;
@@ -537,12 +560,15 @@ struct Local {
 impl Local {
     /// `θ` and `ρ`, from how much `a`, `b`, `a − w` and `b + w` are above the node, and the first-order slope.
     #[inline(always)]
-    fn minimise(self, [ra, rb, rc, rd]: [f32; 4], slope: f32) -> (f32, f32) {
+    fn minimise<const IN_CONE: bool>(self, [ra, rb, rc, rd]: [f32; 4], slope: f32) -> (f32, f32) {
         let Self { a, w, m, at_a, at_b, cone } = self;
-        let wa = ra - cone.rise(a[0], a[1]);
-        let wb = rb - cone.rise(a[0] + w[0], a[1] + w[1]);
-        let wc = rc - cone.rise(a[0] - w[0], a[1] - w[1]);
-        let wd = rd - cone.rise(a[0] + 2.0 * w[0], a[1] + 2.0 * w[1]);
+        let (mut wa, mut wb, mut wc, mut wd) = (ra, rb, rc, rd);
+        if IN_CONE {
+            wa -= cone.rise(a[0], a[1]);
+            wb -= cone.rise(a[0] + w[0], a[1] + w[1]);
+            wc -= cone.rise(a[0] - w[0], a[1] - w[1]);
+            wd -= cone.rise(a[0] + 2.0 * w[0], a[1] + 2.0 * w[1]);
+        }
         let (has_a, has_b) = (ra < 1e17, rb < 1e17);
         let free = has_a & has_b;
         let curvature = choose(free, curvature(wa, wb, wc, wd, rc < 1e17, rd < 1e17), 0.0);
@@ -565,17 +591,25 @@ impl Local {
             let [_, p0, h0] = here.jet(t);
             let [va, pa, ha] = ca.jet(t);
             let [vb, pb, hb] = cb.jet(t);
-            let [_, pc, hc] = far.jet(t);
-            let first = cone.on * pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
+            let (mut pc, mut hc) = (0.0, 0.0);
+            if IN_CONE {
+                let [_, first, second] = far.jet(t);
+                (pc, hc) = (cone.on * first, cone.on * second);
+            }
+            let first = pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
                 + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
             let second =
-                cone.on * hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
+                hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
             let step = choose(second > 1e-6, first / second, 0.0);
             t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
         }
         let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
-        (t, base + t * rise + length - bend + cone.rise(a[0] + t * w[0], a[1] + t * w[1]))
+        let mut rho = base + t * rise + length - bend;
+        if IN_CONE {
+            rho += cone.rise(a[0] + t * w[0], a[1] + t * w[1]);
+        }
+        (t, rho)
     }
 }
 
@@ -614,11 +648,11 @@ fn transport(
     field: &TensorField,
     values: &[[f32; AREA]],
     feet: &[Feet],
+    tolerance: f32,
     control: &Control,
 ) -> Result<Vec<[f32; AREA]>> {
     let tiling = field.tiling;
     let tiles = tiling.tiles();
-    let tolerance = TOLERANCE_CELLS * field.mean_step;
     let least = |tile: &[f32; AREA]| tile.iter().copied().fold(f32::INFINITY, f32::min);
     let keys: Vec<f32> = values.par_iter().map(least).collect();
     let mut order: Vec<u32> = (0..tiles as u32).filter(|&t| keys[t as usize] < UNREACHED).collect();
@@ -684,17 +718,7 @@ fn carry(
     outcome: &mut Outcome,
 ) {
     let mut block = patch(tiling, tile, 0.0, |t| &e[t]);
-    let mut weights = [[[0f32; SIDE]; 8]; SIDE];
-    for row in 0..SIDE {
-        for i in 0..SIDE {
-            let place = row * SIDE + i;
-            if feet.triangle[place] != FIXED {
-                let (a, b) = TRIANGLES[feet.triangle[place] as usize];
-                weights[row][a][i] = 1.0 - feet.theta[place];
-                weights[row][b][i] = feet.theta[place];
-            }
-        }
-    }
+    let weights = weights(feet);
     let mut sweeps = 0;
     let mut dirty = ALL;
     outcome.changed = false;
@@ -708,6 +732,30 @@ fn carry(
     for (row, line) in new.chunks_exact_mut(SIDE).enumerate() {
         line.copy_from_slice(&block[row + MARGIN][MARGIN..MARGIN + SIDE]);
     }
+}
+
+/// Weights of the ring in each node's value, by rows.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn weights(feet: &Feet) -> [[Lanes; 8]; SIDE] {
+    let mut weights = [[[0f32; SIDE]; 8]; SIDE];
+    for (row, weights) in weights.iter_mut().enumerate() {
+        let theta = lanes(&feet.theta, row * SIDE);
+        let mut triangle = [0u8; SIDE];
+        triangle.copy_from_slice(&feet.triangle[row * SIDE..(row + 1) * SIDE]);
+        for t in 0..8 {
+            let (a, b) = TRIANGLES[t];
+            for i in 0..SIDE {
+                let here = triangle[i] == t as u8;
+                weights[a][i] += choose(here, 1.0 - theta[i], 0.0);
+                weights[b][i] += choose(here, theta[i], 0.0);
+            }
+        }
+    }
+    weights
 }
 
 /// One sweep over the rows in `dirty`; the rows next to which something changed by more than `tolerance`.
