@@ -27,7 +27,7 @@ use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
 use super::source::Seeds;
-use super::tiles::{Queue, WINDOW_CELLS};
+use super::tiles::{ITSELF, NEIGHBOURS, Queue, WINDOW_CELLS, neighbour};
 use super::update::{
     ALL, How, Limits, Lines, Prepared, RING, ROUNDING, Tile, UNREACHED, around, choose, greatest, lanes, least, pass,
     prepare, prepare_shifts, tensors,
@@ -84,24 +84,23 @@ fn patch<'a>(
     outside: f32,
     values: impl Fn(usize) -> &'a [f32; AREA],
 ) -> Patch {
-    let (tx, ty) = (tile % tiling.across, tile / tiling.across);
     let mut patch = [[outside; WIDE]; WIDE];
-    for (j, line) in patch.iter_mut().enumerate() {
-        // Row of the patch, counted in nodes from the tile before the first.
-        let row = ty * SIDE + SIDE + j - MARGIN;
-        let (ny, y) = (row / SIDE, row % SIDE * SIDE);
-        if ny == 0 || ny > tiling.down {
-            continue;
-        }
-        let base = (ny - 1) * tiling.across;
-        if tx > 0 {
-            let west = &values(base + tx - 1)[y + SIDE - MARGIN..];
-            (line[0], line[1]) = (west[0], west[1]);
-        }
-        line[MARGIN..MARGIN + SIDE].copy_from_slice(&values(base + tx)[y..y + SIDE]);
-        if tx + 1 < tiling.across {
-            let east = &values(base + tx + 1)[y..];
-            (line[MARGIN + SIDE], line[MARGIN + SIDE + 1]) = (east[0], east[1]);
+    let column = |dy: isize| {
+        [-1, 0, 1].map(|dx| Some(values(neighbour(tiling, tile, dx, dy)?).as_chunks::<SIDE>().0))
+    };
+    let rows = [(-1, SIDE - MARGIN..SIDE, 0), (0, 0..SIDE, MARGIN), (1, 0..MARGIN, MARGIN + SIDE)];
+    for (dy, from, to) in rows {
+        let [west, middle, east] = column(dy);
+        for (row, line) in from.zip(&mut patch[to..]) {
+            if let Some(west) = west {
+                line[..MARGIN].copy_from_slice(&west[row][SIDE - MARGIN..]);
+            }
+            if let Some(middle) = middle {
+                line[MARGIN..MARGIN + SIDE].copy_from_slice(&middle[row]);
+            }
+            if let Some(east) = east {
+                line[MARGIN + SIDE..].copy_from_slice(&east[row][..MARGIN]);
+            }
         }
     }
     patch
@@ -721,15 +720,15 @@ fn transport(
             }
             let mut wake = |tile: usize| {
                 if activations[tile] < MOST_ACTIVATIONS {
-                    queue.wake(tile, keys[tile], super::tiles::ITSELF);
+                    queue.wake(tile, keys[tile], ITSELF);
                 }
             };
             if !outcome.settled {
                 wake(tile);
             }
             if outcome.changed {
-                for (side, (dx, dy)) in super::tiles::NEIGHBOURS.into_iter().enumerate() {
-                    if let Some(n) = super::tiles::neighbour(&tiling, tile, dx, dy)
+                for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
+                    if let Some(n) = neighbour(&tiling, tile, dx, dy)
                         && feet[n].reads & 1 << ((side + 4) % 8) != 0
                     {
                         wake(n);
@@ -741,7 +740,7 @@ fn transport(
         let next = order.peek().map_or(f32::INFINITY, |&tile| keys[tile as usize]);
         let limit = queue.least_key().min(next) + WINDOW_CELLS * field.mean_step;
         while let Some(tile) = order.next_if(|&tile| keys[tile as usize] <= limit) {
-            queue.wake(tile as usize, keys[tile as usize], super::tiles::ITSELF);
+            queue.wake(tile as usize, keys[tile as usize], ITSELF);
         }
         if limit.is_finite() {
             round += 1;
