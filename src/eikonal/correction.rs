@@ -140,7 +140,7 @@ pub(super) fn correct(
 /// What may be wrong with a corrected value: the last round's change, the share of the correction that is typically
 /// left after it, and rounding.
 fn error_left(value: f32, total: f32, last: f32) -> f32 {
-    const SHARE_LEFT: f32 = 0.02;
+    const SHARE_LEFT: f32 = 0.1;
     last.abs() + SHARE_LEFT * total.abs() + ROUNDING * value
 }
 
