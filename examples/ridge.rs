@@ -41,7 +41,7 @@ fn main() -> Result<(), Error> {
     ];
     let start = frame.to_grid(DVec2::new(0.0, -500.0));
     let goal = frame.to_grid(DVec2::new(0.0, 500.0));
-    let comparison = Comparison::between(&metrics, &start.into(), goal, &control)?;
+    let comparison = Comparison::between(&metrics, &[start.into()], goal, &control)?;
     println!("route, length m, climb m, total normal curvature rad, x isotropic, x curvature");
     for (r, route) in comparison.routes.iter().enumerate() {
         let s = &route.summary;

@@ -173,6 +173,13 @@ pub(crate) struct DistanceArgs {
     /// Add a band with the direction of travel from the start, degrees clockwise from north.
     #[arg(long, requires = "output")]
     pub(crate) direction: bool,
+    /// Which start each cell is nearest to, as a GeoTIFF: 1 for the first --start, 2 for the second, ...; 0 where not
+    /// reached. A file of several shapes is one start.
+    #[arg(long, value_name = "FILE.tif")]
+    pub(crate) labels: Option<PathBuf>,
+    /// Go no farther than this distance, in the unit of the metric; cells beyond are nodata.
+    #[arg(long, value_name = "VALUE", conflicts_with = "goal", value_parser = not_negative, allow_hyphen_values = true)]
+    pub(crate) max_distance: Option<f64>,
     /// Lines of equal distance, as GeoJSON.
     #[arg(long, value_name = "FILE.geojson")]
     pub(crate) isolines: Option<PathBuf>,

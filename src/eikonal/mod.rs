@@ -11,8 +11,10 @@ mod cell;
 mod cone;
 mod crew;
 mod field;
+mod labels;
 pub mod reference;
 mod source;
+mod stop;
 mod tiles;
 mod update;
 
@@ -22,8 +24,9 @@ use self::cone::Cones;
 pub use self::field::TensorField;
 pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
+pub use self::stop::Stop;
 pub use self::tiles::Statistics;
-use self::tiles::Values;
+use self::tiles::{News, Values};
 use self::update::{RING, UNREACHED, segment};
 use crate::{Control, Error, GridFrame, MetricField, Result};
 
@@ -42,20 +45,20 @@ impl Default for Solver {
 }
 
 impl Solver {
-    /// Distance under `metric` from `start` (grid coordinates), at every node that can be reached. With `goals`, stops
-    /// as soon as the values around all of them are final; nodes farther away may then be unreached or too high.
+    /// Distance under `metric` from the nearest of `starts` (grid coordinates), the distance already travelled there
+    /// included, at every node that can be reached before `stop`.
     ///
     /// # Errors
-    /// [`Error::Usage`] if no open node is at the start; [`Error::Cancelled`].
+    /// [`Error::Usage`] if no open node is at any start, or a number is out of range; [`Error::Cancelled`].
     pub fn solve(
         &self,
         metric: &MetricField<'_>,
-        start: &StartRegion,
-        goals: &[DVec2],
+        starts: &[StartRegion],
+        stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
         let field = TensorField::sample(metric, control)?;
-        let mut map = self.solve_field(field, start, goals, control)?;
+        let mut map = self.solve_field(field, starts, stop, control)?;
         map.unit = metric.unit();
         map.frame = Some(metric.surface().frame().clone());
         Ok(map)
@@ -68,28 +71,16 @@ impl Solver {
     pub fn solve_field(
         &self,
         field: TensorField,
-        start: &StartRegion,
-        goals: &[DVec2],
+        starts: &[StartRegion],
+        stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
-        let mut cones = Cones::new(&field, start);
-        let mut seeded = Values::unreached(&field);
-        let mut seeds = 0;
-        start.seed(&field, |col, row, value| {
-            seeded.lower(col, row, value as f32);
-            seeds += 1;
-        });
-        if seeds == 0 {
-            return Err(Error::usage(
-                "no open ground at the start: it lies outside the grid, on a void or a barrier, or where the metric \
-                 is too extreme to compute with, as around heights that no terrain has",
-            ));
-        }
-        let done = |is_final: &dyn Fn(usize, usize) -> bool| {
-            !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, goal, is_final))
-        };
+        stop.check()?;
+        let seeded = seeded(&field, starts)?;
+        let mut cones = Cones::new(&field, starts);
         let solve = |cones: &Cones| {
-            tiles::solve(&field, cones, seeded.clone(), self.tolerance, &done, control)
+            let values = seeded.clone();
+            tiles::solve(&field, cones, values, News::All, self.tolerance, stop, control)
         };
         let mut solution = solve(&cones)?;
         if solution.is_none() && !cones.is_empty() {
@@ -104,31 +95,49 @@ impl Solver {
             field,
             cones,
             values,
-            start: start.clone(),
+            starts: starts.into(),
             statistics,
             unit: "",
             frame: None,
         })
     }
+
+    /// Goes on with a map that a [`Stop`] ended, without solving again what is final. The outcome is that of a solve
+    /// with the new `stop` from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was added.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume(&self, map: DistanceMap, stop: &Stop, control: &Control) -> Result<DistanceMap> {
+        stop.check()?;
+        let DistanceMap { field, cones, starts, values: before, .. } = &map;
+        let mut values = before.clone();
+        source::seed_all(field, starts, |col, row, value, _| values.lower(col, row, value))?;
+        let news = News::Since(before);
+        let solution = tiles::solve(field, cones, values, news, self.tolerance, stop, control)?;
+        match solution {
+            Some((values, statistics)) => Ok(DistanceMap { values, statistics, ..map }),
+            None => {
+                let again = self.solve_field(map.field, &map.starts, stop, control)?;
+                Ok(DistanceMap { unit: map.unit, frame: map.frame, ..again })
+            }
+        }
+    }
 }
 
-/// Whether the open corners of the goal's cell have final values.
-fn is_settled(field: &TensorField, goal: DVec2, is_final: &dyn Fn(usize, usize) -> bool) -> bool {
-    let (col, row) = (goal.x.max(0.0) as usize, goal.y.max(0.0) as usize);
-    let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (col + i, row + j));
-    corners
-        .into_iter()
-        .filter(|&(c, r)| c < field.cols() && r < field.rows() && field.is_open(c, r))
-        .all(|(c, r)| is_final(c, r))
+/// The start values alone.
+fn seeded(field: &TensorField, starts: &[StartRegion]) -> Result<Values> {
+    let mut values = Values::unreached(field);
+    source::seed_all(field, starts, |col, row, value, _| values.lower(col, row, value))?;
+    Ok(values)
 }
 
-/// Distance from the start region at every node.
+/// Distance from the nearest start region at every node.
 #[derive(Clone, Debug)]
 pub struct DistanceMap {
     pub(crate) field: TensorField,
     cones: Cones,
     values: Values,
-    pub(crate) start: StartRegion,
+    starts: Box<[StartRegion]>,
     statistics: Statistics,
     unit: &'static str,
     frame: Option<GridFrame>,
@@ -213,9 +222,7 @@ impl DistanceMap {
 
     /// The point of the start region to go to straight from `at`, if that is the shortest way.
     pub(crate) fn straight_home(&self, at: DVec2, value: f64) -> Option<DVec2> {
-        /// The values of nodes are rounded to `f32`.
-        const SLACK: f64 = 1.0 + 1e-6;
-        let (foot, length) = self.start.foot(&self.field, at, SEED_SIGHT)?;
+        let (foot, length) = source::foot_on_any(&self.starts, &self.field, at, SEED_SIGHT)?;
         (length <= SLACK * value).then_some(foot)
     }
 
@@ -241,8 +248,12 @@ impl DistanceMap {
         if outside || !at.is_finite() {
             return None;
         }
-        let straight = self.start.foot(&self.field, at, SEED_SIGHT).map(|(_, length)| length);
-        straight.into_iter().chain(self.interpolated(at)).min_by(f64::total_cmp)
+        let straight = source::foot_on_any(&self.starts, &self.field, at, SEED_SIGHT);
+        straight
+            .map(|(_, length)| length)
+            .into_iter()
+            .chain(self.interpolated(at))
+            .min_by(f64::total_cmp)
     }
 
     /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.
@@ -266,7 +277,7 @@ impl DistanceMap {
                 let nodes = used().map(|(c, r, w)| w * g0(DVec2::new(c as f64, r as f64)));
                 g0(at) - nodes.sum::<f64>()
             });
-            return Some(linear + bent.unwrap_or(0.0));
+            return Some((linear + bent.unwrap_or(0.0)).max(0.0));
         }
         let metric = self.field.metric_at(at)?;
         used()
@@ -277,6 +288,9 @@ impl DistanceMap {
             .min_by(f64::total_cmp)
     }
 }
+
+/// The values of nodes are rounded to `f32`.
+const SLACK: f64 = 1.0 + 1e-6;
 
 /// Within this many cells of the start the straight way to it is considered.
 const SEED_SIGHT: f64 = 4.0;

@@ -3,8 +3,7 @@
 use super::cone::Cones;
 use super::field::TensorField;
 use super::source::StartRegion;
-use super::tiles::Values;
-use super::{DistanceMap, Statistics, best_foot};
+use super::{DistanceMap, Statistics, best_foot, seeded};
 use crate::{Control, Error, Result};
 
 /// Sweeps after which a solve is given up.
@@ -14,11 +13,10 @@ const MOST_SWEEPS: usize = 2000;
 /// minimum over the ring and whole-grid Gauss–Seidel sweeps go on until no node changes at all.
 ///
 /// # Errors
-/// Cancelled.
-pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Result<DistanceMap> {
-    let cones = Cones::new(&field, start);
-    let mut values = Values::unreached(&field);
-    start.seed(&field, |col, row, value| values.lower(col, row, value as f32));
+/// As [`Solver::solve`](super::Solver::solve).
+pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> Result<DistanceMap> {
+    let mut values = seeded(&field, starts)?;
+    let cones = Cones::new(&field, starts);
     let (cols, rows) = (field.cols(), field.rows());
     let mut changed = true;
     let mut sweep = 0;
@@ -48,7 +46,7 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
         field,
         cones,
         values,
-        start: start.clone(),
+        starts: starts.into(),
         statistics,
         unit: "",
         frame: None,

@@ -36,7 +36,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
         .into_iter()
         .map(|name| journey.field(name))
         .collect::<Result<Vec<_>>>()?;
-    let comparison = Comparison::between(&fields, &journey.start, goal.at, control)
+    let comparison = Comparison::between(&fields, &journey.regions, goal.at, control)
         .or_else(|error| journey.explain(error, &fields))?;
     let table = table(&fields, &comparison).to_string();
     let summary = summary(&fields, &comparison, &journey);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use ridgeway::export::{Samples, isolines, isolines_geojson, levels_by_step, round_step};
-use ridgeway::{Control, DistanceMap, MetricField, Result};
+use ridgeway::{Control, DistanceMap, MetricField, Result, Stop};
 use serde_json::{Value, json};
 
 use crate::args::{DistanceArgs, RunArgs};
@@ -16,9 +16,9 @@ use crate::report::{Facts, Report, distance, wrote};
 const ISOLINES: usize = 20;
 
 pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Result<()> {
-    let outputs: Vec<_> = args.output.iter().chain(&args.isolines).collect();
+    let outputs: Vec<_> = args.output.iter().chain(&args.labels).chain(&args.isolines).collect();
     check_distinct(&outputs)?;
-    if let Some(path) = &args.output {
+    for path in args.output.iter().chain(&args.labels) {
         check_file(path, &["tif", "tiff"], args.overwrite, Some(&args.dem))?;
     }
     if let Some(path) = &args.isolines {
@@ -28,7 +28,8 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
-    let map = journey.solve(&field, true)?;
+    let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
+    let map = journey.solve(&field, &stop)?;
     control.check()?;
     let provenance = journey.provenance(std::slice::from_ref(&field));
     if let Some(path) = &args.isolines {
@@ -37,6 +38,12 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     }
     if let Some(path) = &args.output {
         write_map(path, args, &journey, &map)?;
+    }
+    if let Some(path) = &args.labels {
+        let labels: Vec<u32> =
+            map.labels().into_iter().map(|label| label.map_or(0, |label| label + 1)).collect();
+        let bands = [("nearest start".into(), Samples::U32(&labels))];
+        write_raster(path, args.overwrite, &journey.terrain, &bands)?;
     }
     let report = report(args, &journey, &field, &map, &provenance);
     let written: String = outputs.iter().map(|path| wrote(path)).collect();
