@@ -12,7 +12,7 @@ use glam::DVec2;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use ridgeway::eikonal::TensorField;
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
-use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers};
+use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Stop};
 
 use problems::{ACCURACIES, Problem, solver};
 
@@ -98,7 +98,8 @@ fn time_solves(
         let solver = solver(accuracy).expect("a known accuracy");
         let id = BenchmarkId::new(format!("solve {name} {accuracy}"), threads);
         group.bench_function(id, |b| {
-            let solve = |field| pool.install(|| solver.solve_field(field, &start, &[], &control));
+            let solve =
+                |field| pool.install(|| solver.solve_field(field, &start, &Stop::Never, &control));
             b.iter_batched(|| field.clone(), solve, BatchSize::LargeInput);
         });
     }

@@ -9,7 +9,7 @@ use ridgeway::route::trace;
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
     Control, Crs, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground, HeightSurface,
-    Metric, MetricField, Modifiers, Smoothing, Solver, Sym2, Terrain,
+    Metric, MetricField, Modifiers, Smoothing, Solver, Stop, Sym2, Terrain,
 };
 
 const RESOLUTIONS: [usize; 4] = [101, 201, 401, 801];
@@ -46,7 +46,7 @@ fn surface(n: usize, height: impl Fn(DVec2) -> f64) -> Result<HeightSurface, Err
 
 fn solve(metric: &MetricField<'_>, start: DVec2) -> Result<DistanceMap, Error> {
     let start = metric.surface().frame().to_grid(start);
-    Solver::default().solve(metric, &start.into(), &[], &Control::default())
+    Solver::default().solve(metric, &[start.into()], &Stop::Never, &Control::default())
 }
 
 /// Mean error over the nodes relative to the mean distance.

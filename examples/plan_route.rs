@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 use ridgeway::{
-    Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Terrain, route::trace,
+    Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain, route::trace,
 };
 
 fn main() -> Result<(), ridgeway::Error> {
@@ -14,7 +14,8 @@ fn main() -> Result<(), ridgeway::Error> {
     let metric = Metric::Curvature(Default::default()).on(&surface, &Modifiers::default())?;
     let start = terrain.from_lonlat(DVec2::new(-84.38, 36.21))?;
     let goal = terrain.from_lonlat(DVec2::new(-84.10, 36.39))?;
-    let distance = Solver::default().solve(&metric, &start.into(), &[goal], &control)?;
+    let distance =
+        Solver::default().solve(&metric, &[start.into()], &Stop::AllGoals(vec![goal]), &control)?;
     let route = trace(&distance, &metric, goal)?;
     println!("{:.2} km, climb {:.0} m", route.summary.length_m / 1000.0, route.summary.climb_m);
     Ok(())

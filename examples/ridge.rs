@@ -10,7 +10,7 @@ use ridgeway::export::isolines;
 use ridgeway::render::{IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::{
     Comparison, Control, Crs, Delta, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric,
-    Modifiers, Smoothing, Terrain,
+    Modifiers, Smoothing, Solver, Terrain,
 };
 
 const N: usize = 161;
@@ -41,7 +41,8 @@ fn main() -> Result<(), Error> {
     ];
     let start = frame.to_grid(DVec2::new(0.0, -500.0));
     let goal = frame.to_grid(DVec2::new(0.0, 500.0));
-    let comparison = Comparison::between(&metrics, &start.into(), goal, &control)?;
+    let comparison =
+        Comparison::between(Solver::default(), &metrics, &[start.into()], goal, &control)?;
     println!("route, length m, climb m, total normal curvature rad, x isotropic, x curvature");
     for (r, route) in comparison.routes.iter().enumerate() {
         let s = &route.summary;

@@ -15,7 +15,7 @@
 //!
 //! ```
 //! use ridgeway::route::trace;
-//! use ridgeway::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Terrain};
+//! use ridgeway::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain};
 //!
 //! # fn main() -> Result<(), ridgeway::Error> {
 //! let control = Control::default();
@@ -25,7 +25,7 @@
 //!
 //! let start = terrain.frame().to_grid(glam::DVec2::new(-84.38, 36.21));
 //! let goal = terrain.frame().to_grid(glam::DVec2::new(-84.10, 36.39));
-//! let distance = Solver::default().solve(&metric, &start.into(), &[goal], &control)?;
+//! let distance = Solver::default().solve(&metric, &[start.into()], &Stop::AllGoals(vec![goal]), &control)?;
 //! let route = trace(&distance, &metric, goal)?;
 //! assert!(route.summary.length_m > 30_000.0);
 //! # Ok(())
@@ -75,7 +75,7 @@ pub mod surface;
 pub mod terrain;
 
 pub use control::{CancelToken, Control, Progress};
-pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion};
+pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion, Stop};
 pub use error::{Error, Result};
 pub use grid::{GridFrame, Ground};
 pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};

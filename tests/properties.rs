@@ -6,7 +6,7 @@ use glam::DVec2;
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind, cylinder_distance, sphere_distance};
 use ridgeway::{
     Comparison, Control, Crs, Delta, DistanceMap, FitOptions, GridFrame, Ground, HeightSurface,
-    Metric, Modifiers, Route, Smoothing, Solver, Terrain, route::trace,
+    Metric, Modifiers, Route, Smoothing, Solver, Stop, Terrain, route::trace,
 };
 
 /// A rough terrain of `n × n` nodes.
@@ -32,7 +32,8 @@ fn plan(terrain: &Terrain, metric: &Metric, start: DVec2, goal: DVec2) -> Planne
     let control = Control::default();
     let surface = HeightSurface::fit(terrain, &FitOptions::default(), &control).unwrap();
     let field = metric.on(&surface, &Modifiers::default()).unwrap();
-    let distance = Solver::default().solve(&field, &start.into(), &[], &control).unwrap();
+    let distance =
+        Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap();
     let route = trace(&distance, &field, goal).unwrap();
     Planned { distance, route }
 }
@@ -157,7 +158,8 @@ fn stretched_cells_give_the_same_distances_at_the_same_places() {
             let surface = HeightSurface::fit(terrain, &options, &control).unwrap();
             let field = metric.on(&surface, &Modifiers::default()).unwrap();
             let start = DVec2::new(30.0, 40.0 / stretch);
-            let map = Solver::default().solve(&field, &start.into(), &[], &control).unwrap();
+            let map =
+                Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap();
             move |col: usize, row: usize| map.at_node(col, row / stretch as usize)
         });
         for row in (0..161).step_by(20) {
@@ -208,7 +210,8 @@ fn a_goal_on_the_start_costs_nothing_and_every_route_there_is_best() {
     let control = Control::default();
     let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
     let fields = metrics().map(|metric| metric.on(&surface, &Modifiers::default()).unwrap());
-    let comparison = Comparison::between(&fields, &GOAL.into(), GOAL, &control).unwrap();
+    let comparison =
+        Comparison::between(Solver::default(), &fields, &[GOAL.into()], GOAL, &control).unwrap();
     for (m, costs) in comparison.costs.iter().enumerate() {
         for (r, &cost) in costs.iter().enumerate() {
             assert_eq!((cost, comparison.ratio(m, r)), (0.0, 1.0));
@@ -233,7 +236,8 @@ fn errors(
     let field = metric.on(&surface, &Modifiers::default()).unwrap();
     let start = DVec2::new(-31.3, 20.4);
     let grid = |p: DVec2| terrain.frame().to_grid(p);
-    let map = Solver::default().solve(&field, &grid(start).into(), &[], &control).unwrap();
+    let map =
+        Solver::default().solve(&field, &[grid(start).into()], &Stop::Never, &control).unwrap();
     goals.fold((0.0, 0.0), |(cost, far), goal| {
         let route = trace(&map, &field, grid(goal)).unwrap();
         let error: f64 = route.summary.cost / exact(start, goal) - 1.0;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec2;
 use ridgeway::route::trace;
 use ridgeway::{
-    Control, Delta, FitOptions, HeightSurface, Metric, Modifiers, Smoothing, Solver, Terrain,
+    Control, Delta, FitOptions, HeightSurface, Metric, Modifiers, Smoothing, Solver, Stop, Terrain,
 };
 
 fn shared(path: &str) -> PathBuf {
@@ -51,7 +51,9 @@ fn mean_share(surface: &HeightSurface, metric: &Metric, roads: &[Vec<DVec2>]) ->
     let field = metric.on(surface, &Modifiers::default()).unwrap();
     let shares = roads.iter().map(|road| {
         let (start, goal) = (road[0], road[road.len() - 1]);
-        let map = Solver::default().solve(&field, &start.into(), &[goal], &control).unwrap();
+        let map = Solver::default()
+            .solve(&field, &[start.into()], &Stop::AllGoals(vec![goal]), &control)
+            .unwrap();
         share(road, &trace(&map, &field, goal).unwrap().grid)
     });
     shares.sum::<f64>() / roads.len() as f64

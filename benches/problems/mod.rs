@@ -61,8 +61,8 @@ pub(crate) const DELTA: f64 = 0.25;
 
 impl Problem {
     /// The start: the middle, in grid coordinates.
-    pub(crate) fn start(n: usize) -> StartRegion {
-        DVec2::splat(0.5 * (n - 1) as f64).into()
+    pub(crate) fn start(n: usize) -> [StartRegion; 1] {
+        [DVec2::splat(0.5 * (n - 1) as f64).into()]
     }
 
     /// The tensors at `n × n` nodes.

@@ -17,7 +17,7 @@ use std::time::Instant;
 use clap::Parser;
 use glam::DVec2;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use ridgeway::{Control, DistanceMap};
+use ridgeway::{Control, DistanceMap, Stop};
 use serde::Serialize;
 
 use problems::{ACCURACIES, Problem, solver};
@@ -132,7 +132,7 @@ fn measure<'a>(
             let field = field.clone();
             let speedup = spin_speedup(pool);
             let begin = Instant::now();
-            let map = pool.install(|| solver.solve_field(field, &start, &[], &control))?;
+            let map = pool.install(|| solver.solve_field(field, &start, &Stop::Never, &control))?;
             let solve_s = begin.elapsed().as_secs_f64();
             let begin = Instant::now();
             let values = pool.install(|| map.to_row_major());
@@ -180,7 +180,7 @@ fn judge(
     let fine = times * (n - 1) + 1;
     let best = solver(ACCURACIES[ACCURACIES.len() - 1]).ok_or("no such accuracy")?;
     let field = problem.field(fine, &control)?;
-    let fine = best.solve_field(field, &Problem::start(fine), &[], &control)?;
+    let fine = best.solve_field(field, &Problem::start(fine), &Stop::Never, &control)?;
     let value = |col: usize, row: usize| fine.at_node(times * col, times * row);
     let reached = |col, row| Some(value(col, row)).filter(|value| value.is_finite());
     Ok(Some(compare(map, "finer grid", reached)))

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec2;
-use ridgeway::{Degree, Delta, FitOptions, Smoothing};
+use ridgeway::{Accuracy, Degree, Delta, FitOptions, Smoothing, Solver};
 
 use crate::places::Place;
 
@@ -173,15 +173,25 @@ pub(crate) struct DistanceArgs {
     /// Add a band with the direction of travel from the start, degrees clockwise from north.
     #[arg(long, requires = "output")]
     pub(crate) direction: bool,
+    /// Which start each cell is nearest to, as a GeoTIFF: 1 for the first --start, 2 for the second, ...; 0 where not
+    /// reached. A file of several shapes is one start.
+    #[arg(long, value_name = "FILE.tif")]
+    pub(crate) labels: Option<PathBuf>,
+    /// Go no farther than this distance, in the unit of the metric; cells beyond are nodata.
+    #[arg(long, value_name = "VALUE", conflicts_with = "goal", value_parser = not_negative, allow_hyphen_values = true)]
+    pub(crate) max_distance: Option<f64>,
     /// Lines of equal distance, as GeoJSON.
     #[arg(long, value_name = "FILE.geojson")]
     pub(crate) isolines: Option<PathBuf>,
     /// Distance between isolines, in the unit of the metric [default: a round number giving about twenty].
     #[arg(long, value_name = "VALUE", requires = "isolines", value_parser = positive, allow_hyphen_values = true)]
     pub(crate) step: Option<f64>,
-    /// Print quantiles of the distance.
+    /// Print quantiles of the distance, of its error with --accuracy high, and how much work the solver had.
     #[arg(long)]
     pub(crate) stats: bool,
+    /// Add a band with an estimate of the error; needs --accuracy high.
+    #[arg(long, requires = "output")]
+    pub(crate) error: bool,
     #[command(flatten)]
     pub(crate) ground: GroundArgs,
 }
@@ -354,6 +364,27 @@ pub(crate) struct MetricArgs {
     /// Your own speed tensors: a float raster on the DEM's grid with bands D11, D12, D22, x east, y north.
     #[arg(long, value_name = "FILE.tif")]
     pub(crate) tensor: Option<PathBuf>,
+    /// How exactly to solve: `high` is of second order in the cell size and takes four to five times as long in the solver.
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = AccuracyName::Fast)]
+    pub(crate) accuracy: AccuracyName,
+}
+
+impl MetricArgs {
+    pub(crate) fn solver(&self) -> Solver {
+        let accuracy = match self.accuracy {
+            AccuracyName::Fast => Accuracy::Fast,
+            AccuracyName::High => Accuracy::High,
+        };
+        Solver { accuracy, ..Solver::default() }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum AccuracyName {
+    /// First order.
+    Fast,
+    /// Second order, with an estimate of the error.
+    High,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

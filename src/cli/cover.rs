@@ -153,6 +153,7 @@ mod tests {
             points: vec![DVec2::splat(-7.0), DVec2::splat(1e18)],
             lines: vec![far.clone(), line(&[(-5.0, -1.0), (9.0, -1.0)])],
             areas: vec![vec![far]],
+            ..StartRegion::default()
         };
         picture(3, 2, &shapes);
     }

@@ -186,46 +186,47 @@ impl Spot {
     }
 }
 
-/// The start region of the places of `option`, and its points by themselves.
+/// The start regions of the places of `option`, one for each, and their points by themselves.
 ///
 /// # Errors
 /// A point outside the DEM; a file that cannot be read or holds nothing.
-pub(crate) fn region(
+pub(crate) fn regions(
     option: &'static str,
     places: &[Place],
     terrain: &Terrain,
-) -> Result<(StartRegion, Vec<Spot>)> {
-    let (mut region, mut spots) = (StartRegion::default(), Vec::new());
+) -> Result<(Vec<StartRegion>, Vec<Spot>)> {
+    let (mut regions, mut spots) = (Vec::new(), Vec::new());
     for place in places {
+        let first = spots.len();
+        let mut region = StartRegion::default();
         match place {
             Place::At(notation, at) => {
                 spots.push(Spot::new(option, place.to_string(), *notation, *at, terrain)?);
             }
             Place::File(path) => {
-                let shapes = read_shapes(path, terrain)?;
-                for &grid in &shapes.points {
+                region = read_shapes(path, terrain)?;
+                for &grid in &region.points {
                     spots.push(file_spot(option, path, grid, terrain)?);
                 }
-                region.lines.extend(shapes.lines);
-                region.areas.extend(shapes.areas);
             }
         }
+        region.points = spots[first..].iter().map(|spot| spot.at).collect();
+        regions.push(region);
     }
-    region.points.extend(spots.iter().map(|spot| spot.at));
-    Ok((region, spots))
+    Ok((regions, spots))
 }
 
 /// The points of the places of `option`.
 ///
 /// # Errors
-/// As [`region`]; a file with lines or areas.
+/// As [`regions`]; a file with lines or areas.
 pub(crate) fn points(
     option: &'static str,
     places: &[Place],
     terrain: &Terrain,
 ) -> Result<Vec<Spot>> {
-    let (region, spots) = region(option, places, terrain)?;
-    if region.lines.is_empty() && region.areas.is_empty() {
+    let (regions, spots) = regions(option, places, terrain)?;
+    if regions.iter().all(|region| region.lines.is_empty() && region.areas.is_empty()) {
         return Ok(spots);
     }
     Err(Error::usage(format!("{option} takes points; its file also holds lines or areas")))

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ridgeway::terrain::read_bands;
 use ridgeway::{
     Control, DistanceMap, Error, HeightSurface, Metric, MetricField, Modifiers, Result, Smoothing,
-    Solver, StartRegion, Sym2, Terrain,
+    StartRegion, Stop, Sym2, Terrain,
 };
 use serde_json::{Value, json};
 
@@ -22,7 +22,8 @@ pub(crate) struct Journey<'a> {
     dem: &'a Path,
     pub(crate) terrain: Terrain,
     pub(crate) surface: HeightSurface,
-    pub(crate) start: StartRegion,
+    /// One for each `--start`.
+    pub(crate) regions: Vec<StartRegion>,
     pub(crate) starts: Vec<Spot>,
     pub(crate) goals: Vec<Spot>,
     start_names: Vec<String>,
@@ -44,9 +45,9 @@ impl<'a> Journey<'a> {
     ) -> Result<Self> {
         let terrain = open(dem, run)?;
         let barrier = barrier(args, &terrain)?;
-        let (region, starts) = places::region("--start", start, &terrain)?;
+        let (regions, starts) = places::regions("--start", start, &terrain)?;
         let goals = places::points("--goal", goal, &terrain)?;
-        check_open(&terrain, barrier.as_deref(), &region, starts.iter().chain(&goals))?;
+        check_open(&terrain, barrier.as_deref(), &regions, starts.iter().chain(&goals))?;
         let tensors = match &args.metric.tensor {
             Some(path) => Some(tensors(path, &terrain)?),
             None => None,
@@ -59,7 +60,7 @@ impl<'a> Journey<'a> {
             dem,
             terrain,
             surface,
-            start: region,
+            regions,
             starts,
             goals,
             start_names,
@@ -111,14 +112,17 @@ impl<'a> Journey<'a> {
         Ok(field)
     }
 
-    /// Distance from the start; with `everywhere`, at all cells, else as far as the goals.
+    /// No farther than the goals.
+    pub(crate) fn all_goals(&self) -> Stop {
+        Stop::AllGoals(self.goals.iter().map(|goal| goal.at).collect())
+    }
+
+    /// Distance from the nearest start.
     ///
     /// # Errors
     /// [`Error::NoWay`] if a goal cannot be reached: the message names the nearest place that can.
-    pub(crate) fn solve(&self, field: &MetricField<'_>, everywhere: bool) -> Result<DistanceMap> {
-        let goals: Vec<_> = self.goals.iter().map(|goal| goal.at).collect();
-        let stop = if everywhere { &[][..] } else { &goals };
-        let distance = Solver::default().solve(field, &self.start, stop, self.control)?;
+    pub(crate) fn solve(&self, field: &MetricField<'_>, stop: &Stop) -> Result<DistanceMap> {
+        let distance = self.args.metric.solver().solve(field, &self.regions, stop, self.control)?;
         for goal in &self.goals {
             if distance.at(goal.at).is_none() {
                 let reached = |col, row| distance.at_node(col, row).is_finite();
@@ -143,7 +147,7 @@ impl<'a> Journey<'a> {
     pub(crate) fn explain<T>(&self, error: Error, fields: &[MetricField<'_>]) -> Result<T> {
         if let Error::NoWay(_) = error {
             for field in fields {
-                self.solve(field, true)?;
+                self.solve(field, &Stop::Never)?;
             }
         }
         Err(error)
@@ -209,11 +213,11 @@ fn barrier(args: &GroundArgs, terrain: &Terrain) -> Result<Option<Arc<[bool]>>> 
     Ok(any.then(|| cover(terrain.frame(), &shapes).into()))
 }
 
-/// Checks that points are, and that a start of lines and areas touches, neither void nor barrier.
+/// Checks that points lie on, and that every start of lines and areas touches, open ground.
 fn check_open<'s>(
     terrain: &Terrain,
     barrier: Option<&[bool]>,
-    region: &StartRegion,
+    regions: &[StartRegion],
     spots: impl Iterator<Item = &'s Spot>,
 ) -> Result<()> {
     let closed = |col, row| barrier.is_some_and(|cells| cells[terrain.frame().index(col, row)]);
@@ -226,7 +230,7 @@ fn check_open<'s>(
         };
         spot.check(terrain, open, why)?;
     }
-    if region.points.is_empty() {
+    for region in regions.iter().filter(|region| region.points.is_empty()) {
         let touched = cover(terrain.frame(), region);
         let cols = terrain.frame().cols();
         let any = touched.iter().enumerate().any(|(i, &t)| t && open(i % cols, i / cols));

@@ -40,11 +40,18 @@ pub(crate) struct Cone {
     pub(crate) metric: Sym2,
     /// Directions of the sides of the start region that end here; the fan is what both leave free, see [`Self::holds`].
     pub(crate) sides: [DVec2; 2],
+    /// Distance at the point, in stored units.
+    travelled: f64,
 }
 
 impl Cone {
-    pub(crate) fn new(field: &TensorField, at: DVec2, sides: [DVec2; 2]) -> Option<Self> {
-        Some(Self { at, metric: field.metric_at(at)?, sides })
+    pub(crate) fn new(
+        field: &TensorField,
+        at: DVec2,
+        sides: [DVec2; 2],
+        travelled: f64,
+    ) -> Option<Self> {
+        Some(Self { at, metric: field.metric_at(at)?, sides, travelled })
     }
 
     /// Whether the cone is to be taken out at a node of a tile that is not like its point: where `M(s) D` has this
@@ -104,7 +111,7 @@ struct Here {
     alike: bool,
 }
 
-/// The cones of a start region, and which of them each tile lies in.
+/// The cones of the start regions, and which of them each tile lies in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cones {
     cones: Vec<Cone>,
@@ -113,9 +120,15 @@ pub(crate) struct Cones {
 }
 
 impl Cones {
-    pub(crate) fn new(field: &TensorField, start: &StartRegion) -> Self {
-        let cones: Vec<Cone> =
-            start.corners().filter_map(|(at, sides)| Cone::new(field, at, sides)).collect();
+    pub(crate) fn new(field: &TensorField, starts: &[StartRegion]) -> Self {
+        let of_start = |start: &StartRegion| {
+            let travelled = start.value * field.root_scale();
+            let corners = start.corners();
+            corners
+                .filter_map(|(at, sides)| Cone::new(field, at, sides, travelled))
+                .collect::<Vec<_>>()
+        };
+        let cones: Vec<Cone> = starts.iter().flat_map(of_start).collect();
         let tiling = field.tiling;
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
         if cones.is_empty() || radius < POINT_RADIUS {
@@ -185,13 +198,15 @@ impl Cones {
     }
 }
 
-/// The cone nearest to the middle of a tile under its own metric, if within `radius` cells.
+/// The cone that brings the least distance to the middle of a tile under its own metric, if within `radius` cells: where
+/// a far one does, a nearer one that it beats must not be taken out.
 fn nearest(cones: &[Cone], field: &TensorField, tile: usize, radius: f64) -> Option<Here> {
     let middle = field.tiling.first(tile) + 0.5 * (SIDE - 1) as f64;
-    let near = cones.iter().enumerate().filter(|(_, cone)| cone.at.distance(middle) <= radius);
-    let length = |cone: &Cone| cone.value(middle - cone.at);
-    let (index, cone) = near.min_by(|a, b| length(a.1).total_cmp(&length(b.1)))?;
-    Some(Here { index: index as u32, alike: cone.is_like(&field.tiles[tile]) })
+    let length = |cone: &Cone| cone.travelled + cone.value(middle - cone.at);
+    let all = cones.iter().enumerate();
+    let (index, cone) = all.min_by(|a, b| length(a.1).total_cmp(&length(b.1)))?;
+    (cone.at.distance(middle) <= radius)
+        .then(|| Here { index: index as u32, alike: cone.is_like(&field.tiles[tile]) })
 }
 
 #[cfg(test)]
@@ -200,8 +215,12 @@ mod tests {
 
     #[test]
     fn a_shift_continues_the_cone_as_its_tangent_plane() {
-        let cone =
-            Cone { at: DVec2::ZERO, metric: Sym2::new(3.0, -1.0, 0.7), sides: [DVec2::ZERO; 2] };
+        let cone = Cone {
+            at: DVec2::ZERO,
+            metric: Sym2::new(3.0, -1.0, 0.7),
+            sides: [DVec2::ZERO; 2],
+            travelled: 0.0,
+        };
         for v in [DVec2::new(1.0, 2.0), DVec2::new(-7.0, 3.5), DVec2::new(0.3, -2.0)] {
             for by in RING.map(|(i, j)| DVec2::new(i.into(), j.into())) {
                 let slope = cone.metric.apply(v) / cone.value(v);

@@ -12,20 +12,24 @@ mod cone;
 mod correction;
 mod crew;
 mod field;
+mod labels;
 pub mod reference;
 mod source;
+mod stop;
 mod tiles;
 mod update;
 
 use glam::DVec2;
 
 use self::cone::Cones;
-use self::field::AREA;
 pub use self::field::TensorField;
+use self::field::{AREA, TensorTile};
+use self::source::Seeds;
 pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
+pub use self::stop::Stop;
 pub use self::tiles::Statistics;
-use self::tiles::Values;
+use self::tiles::{Equation, News, Values};
 use self::update::{RING, UNREACHED, segment};
 use crate::{Control, Error, GridFrame, MetricField, Result};
 
@@ -56,20 +60,20 @@ impl Default for Solver {
 }
 
 impl Solver {
-    /// Distance under `metric` from `start` (grid coordinates), at every node that can be reached. With `goals`, stops
-    /// as soon as the values around all of them are final; nodes farther away may then be unreached or too high.
+    /// Distance under `metric` from the nearest of `starts` (grid coordinates), the distance already travelled there
+    /// included, at every node that can be reached before `stop`.
     ///
     /// # Errors
-    /// [`Error::Usage`] if no open node is at the start; [`Error::Cancelled`].
+    /// [`Error::Usage`] if no open node is at any start, or a number is out of range; [`Error::Cancelled`].
     pub fn solve(
         &self,
         metric: &MetricField<'_>,
-        start: &StartRegion,
-        goals: &[DVec2],
+        starts: &[StartRegion],
+        stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
         let field = TensorField::sample(metric, control)?;
-        let mut map = self.solve_field(field, start, goals, control)?;
+        let mut map = self.solve_field(field, starts, stop, control)?;
         map.unit = metric.unit();
         map.frame = Some(metric.surface().frame().clone());
         Ok(map)
@@ -82,23 +86,19 @@ impl Solver {
     pub fn solve_field(
         &self,
         field: TensorField,
-        start: &StartRegion,
-        goals: &[DVec2],
+        starts: &[StartRegion],
+        stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
-        let mut cones = Cones::new(&field, start);
-        let seeds = start.seeds(&field);
-        if seeds.iter().all(Option::is_none) {
-            return Err(Error::usage(
-                "no open ground at the start: it lies outside the grid, on a void or a barrier, or where the metric \
-                 is too extreme to compute with, as around heights that no terrain has",
-            ));
-        }
-        let done = |is_final: &dyn Fn(usize, usize) -> bool| {
-            !goals.is_empty() && goals.iter().all(|&goal| is_settled(&field, goal, is_final))
+        stop.check()?;
+        let seeds = source::seeds(&field, starts)?;
+        let mut cones = Cones::new(&field, starts);
+        let solve = |cones: &Cones| {
+            let equation =
+                Equation { field: &field, cones, seeds: &seeds, tolerance: self.tolerance };
+            let values = Values::seeded(&field, &seeds);
+            tiles::solve(&equation, values, News::All, stop, control)
         };
-        let solve =
-            |cones: &Cones| tiles::solve(&field, cones, &seeds, self.tolerance, &done, control);
         let mut solution = solve(&cones)?;
         if solution.is_none() && !cones.is_empty() {
             cones = Cones::default();
@@ -107,37 +107,64 @@ impl Solver {
         let (mut values, statistics) = solution.ok_or_else(|| {
             Error::usage("the distance does not settle on this metric; its tensors are too extreme")
         })?;
-        let mut errors = None;
-        if self.accuracy == Accuracy::High {
-            let correction = correction::correct(&field, &cones, &values.tiles, &seeds, control)?;
-            values.add(&correction.values);
-            errors = Some(correction.errors);
-        }
+        let errors = self.correct(&field, &cones, &mut values, &seeds, control)?;
         control.report("solving distance", 1.0);
         Ok(DistanceMap {
             errors,
             field,
             cones,
             values,
-            start: start.clone(),
+            starts: starts.into(),
             statistics,
             unit: "",
             frame: None,
         })
     }
+
+    /// Brings values to second order if that is asked for; estimates of their errors.
+    fn correct(
+        &self,
+        field: &TensorField,
+        cones: &Cones,
+        values: &mut Values,
+        seeds: &[Option<Box<Seeds>>],
+        control: &Control,
+    ) -> Result<Option<Vec<[f32; AREA]>>> {
+        if self.accuracy == Accuracy::Fast {
+            return Ok(None);
+        }
+        let correction = correction::correct(field, cones, &values.tiles, seeds, control)?;
+        values.add(&correction.values);
+        Ok(Some(correction.errors))
+    }
+
+    /// Goes on with a map that a [`Stop`] ended, without solving again what is final. The outcome is that of a solve
+    /// with the new `stop` from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was added.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume(&self, map: DistanceMap, stop: &Stop, control: &Control) -> Result<DistanceMap> {
+        stop.check()?;
+        let DistanceMap { field, cones, starts, values: before, .. } = &map;
+        let seeds = source::seeds(field, starts)?;
+        let mut values = before.clone();
+        values.seed(&seeds);
+        let equation = Equation { field, cones, seeds: &seeds, tolerance: self.tolerance };
+        let solution = tiles::solve(&equation, values, News::Since(before), stop, control)?;
+        match solution {
+            Some((mut values, statistics)) => {
+                let errors = self.correct(field, cones, &mut values, &seeds, control)?;
+                Ok(DistanceMap { values, errors, statistics, ..map })
+            }
+            None => {
+                let again = self.solve_field(map.field, &map.starts, stop, control)?;
+                Ok(DistanceMap { unit: map.unit, frame: map.frame, ..again })
+            }
+        }
+    }
 }
 
-/// Whether the open corners of the goal's cell have final values.
-fn is_settled(field: &TensorField, goal: DVec2, is_final: &dyn Fn(usize, usize) -> bool) -> bool {
-    let (col, row) = (goal.x.max(0.0) as usize, goal.y.max(0.0) as usize);
-    let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| (col + i, row + j));
-    corners
-        .into_iter()
-        .filter(|&(c, r)| c < field.cols() && r < field.rows() && field.is_open(c, r))
-        .all(|(c, r)| is_final(c, r))
-}
-
-/// Distance from the start region at every node.
+/// Distance from the nearest start region at every node.
 #[derive(Clone, Debug)]
 pub struct DistanceMap {
     pub(crate) field: TensorField,
@@ -145,7 +172,7 @@ pub struct DistanceMap {
     values: Values,
     /// Estimates of the error, in high accuracy.
     errors: Option<Vec<[f32; AREA]>>,
-    pub(crate) start: StartRegion,
+    starts: Box<[StartRegion]>,
     statistics: Statistics,
     unit: &'static str,
     frame: Option<GridFrame>,
@@ -176,6 +203,13 @@ impl DistanceMap {
         self.statistics
     }
 
+    /// Memory that the map takes per node: tensors, values and, in high accuracy, estimates of the error.
+    #[must_use]
+    pub fn bytes_per_node(&self) -> usize {
+        let errors = if self.errors.is_some() { size_of::<[f32; AREA]>() } else { 0 };
+        (size_of::<TensorTile>() + size_of::<[f32; AREA]>() + errors) / AREA
+    }
+
     /// Distance at a node; infinite where not reached.
     #[must_use]
     pub fn at_node(&self, col: usize, row: usize) -> f64 {
@@ -201,11 +235,44 @@ impl DistanceMap {
 
     /// Distance at grid coordinates; `None` outside the grid and where not reached.
     ///
-    /// Near the start the length of the straight way; elsewhere bilinear in a cell with four reached corners, and
-    /// the solver's own update from the reached ones beside walls.
+    /// Near the start the length of the straight way; elsewhere cubic between the nodes where all around are
+    /// reached, bilinear in a cell with four reached corners, and the solver's own update beside walls.
     #[must_use]
     pub fn at(&self, at: DVec2) -> Option<f64> {
-        Some(self.stored_at(at)? / self.field.root_scale())
+        let value = match (self.straight(at), self.cubic(at)) {
+            (Some((_, length)), Some(value)) => length.min(value),
+            (None, Some(value)) => value,
+            _ => self.stored_at(at)?,
+        };
+        Some(value / self.field.root_scale())
+    }
+
+    /// Gradient of the distance at grid coordinates, in ground axes (x east, y north), per metre; `None` where
+    /// [`at`](Self::at) is. By differences over half a cell, one-sided beside walls and borders.
+    #[must_use]
+    pub fn gradient_at(&self, at: DVec2) -> Option<DVec2> {
+        const REACH: f64 = 0.25;
+        let here = self.at(at)?;
+        let slope = |by: DVec2| {
+            let (before, after) = (self.at(at - by), self.at(at + by));
+            let pieces = u8::from(before.is_some()) + u8::from(after.is_some());
+            let rise = after.unwrap_or(here) - before.unwrap_or(here);
+            (pieces > 0).then(|| rise / (REACH * f64::from(pieces)))
+        };
+        let (col, row) = (slope(REACH * DVec2::X)?, slope(REACH * DVec2::Y)?);
+        let spacing = self.frame.as_ref().map_or(DVec2::ONE, |frame| frame.spacing(at.y));
+        Some(DVec2::new(col, -row) / spacing)
+    }
+
+    /// Unit vector of travel away from the start at grid coordinates, in ground axes (x east, y north), along
+    /// `D ∇g`; `None` where [`gradient_at`](Self::gradient_at) is and on the start.
+    #[must_use]
+    pub fn direction_at(&self, at: DVec2) -> Option<DVec2> {
+        let spacing = self.frame.as_ref().map_or(DVec2::ONE, |frame| frame.spacing(at.y));
+        let gradient = self.gradient_at(at)? * spacing;
+        let speed = self.field.metric_at(at)?.inverse();
+        let step = speed.apply(DVec2::new(gradient.x, -gradient.y));
+        (DVec2::new(step.x, -step.y) * spacing).try_normalize()
     }
 
     /// Unit vector of travel away from the start at a node, in ground axes (x east, y north); `None` where not
@@ -239,10 +306,43 @@ impl DistanceMap {
 
     /// The point of the start region to go to straight from `at`, if that is the shortest way.
     pub(crate) fn straight_home(&self, at: DVec2, value: f64) -> Option<DVec2> {
-        /// The values of nodes are rounded to `f32`.
-        const SLACK: f64 = 1.0 + 1e-6;
-        let (foot, length) = self.start.foot(&self.field, at, SEED_SIGHT)?;
+        let (foot, length) = self.straight(at)?;
         (length <= SLACK * value).then_some(foot)
+    }
+
+    /// The nearest point of the start in sight and the length of the way to it.
+    fn straight(&self, at: DVec2) -> Option<(DVec2, f64)> {
+        source::foot_on_any(&self.starts, &self.field, at, SEED_SIGHT)
+    }
+
+    /// Cubic convolution (Keys 1981) of what is left without the cone, where all sixteen nodes are reached; not
+    /// where it leaves what the corners of the cell span, at a kink.
+    fn cubic(&self, at: DVec2) -> Option<f64> {
+        let (col, row) = (at.x.floor(), at.y.floor());
+        let last = DVec2::new(self.cols() as f64, self.rows() as f64) - 3.0;
+        if !(col >= 1.0 && row >= 1.0 && col <= last.x && row <= last.y) {
+            return None;
+        }
+        let (x, y) = (col as usize, row as usize);
+        let nodes = || (0..4).flat_map(|j| (0..4).map(move |i| (i, j)));
+        let place = |i: usize, j: usize| (x + i - 1, y + j - 1);
+        if nodes().any(|(i, j)| !self.is_reached(place(i, j).0, place(i, j).1)) {
+            return None;
+        }
+        let cone = self.cones.around(&self.field, nodes().map(|(i, j)| place(i, j)));
+        let g0 = |at: DVec2| cone.map_or(0.0, |cone| cone.value(at - cone.at));
+        let w = |i: usize, j: usize| {
+            let (c, r) = place(i, j);
+            self.stored(c, r) - g0(DVec2::new(c as f64, r as f64))
+        };
+        let (u, v) = (keys(at.x - col), keys(at.y - row));
+        let value: f64 = nodes().map(|(i, j)| u[i] * v[j] * w(i, j)).sum();
+        let corners = [w(1, 1), w(2, 1), w(1, 2), w(2, 2)];
+        let (least, most) = corners
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &w| (a.min(w), b.max(w)));
+        let margin = 0.25 * (most - least);
+        ((least - margin..=most + margin).contains(&value)).then(|| (value + g0(at)).max(0.0))
     }
 
     /// The point of the start that the cone around `at` comes from, if nothing is in the way.
@@ -267,8 +367,8 @@ impl DistanceMap {
         if outside || !at.is_finite() {
             return None;
         }
-        let straight = self.start.foot(&self.field, at, SEED_SIGHT).map(|(_, length)| length);
-        straight.into_iter().chain(self.interpolated(at)).min_by(f64::total_cmp).map(|g| g.max(0.0))
+        let straight = self.straight(at).map(|(_, length)| length).into_iter();
+        straight.chain(self.interpolated(at)).min_by(f64::total_cmp).map(|g| g.max(0.0))
     }
 
     /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.
@@ -292,7 +392,7 @@ impl DistanceMap {
                 let nodes = used().map(|(c, r, w)| w * g0(DVec2::new(c as f64, r as f64)));
                 g0(at) - nodes.sum::<f64>()
             });
-            return Some(linear + bent.unwrap_or(0.0));
+            return Some((linear + bent.unwrap_or(0.0)).max(0.0));
         }
         let metric = self.field.metric_at(at)?;
         used()
@@ -302,6 +402,20 @@ impl DistanceMap {
             .map(|(node, value)| value + metric.norm(node - at))
             .min_by(f64::total_cmp)
     }
+}
+
+/// The values of nodes are rounded to `f32`.
+const SLACK: f64 = 1.0 + 1e-6;
+
+/// Weights of the four nodes around a point `t` beyond the second, exact for quadratics.
+fn keys(t: f64) -> [f64; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        0.5 * (-t3 + 2.0 * t2 - t),
+        0.5 * (3.0 * t3 - 5.0 * t2 + 2.0),
+        0.5 * (-3.0 * t3 + 4.0 * t2 + t),
+        0.5 * (t3 - t2),
+    ]
 }
 
 /// Within this many cells of the start the straight way to it is considered.

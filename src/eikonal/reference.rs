@@ -7,7 +7,7 @@ use super::field::TensorField;
 use super::source::StartRegion;
 use super::tiles::Values;
 use super::update::{RING, ceiling};
-use super::{DistanceMap, Statistics, best_foot};
+use super::{DistanceMap, Statistics, best_foot, source};
 use crate::{Control, Error, Result};
 
 /// Sweeps after which a solve is given up.
@@ -17,10 +17,10 @@ const MOST_SWEEPS: usize = 2000;
 /// minimum over the ring and whole-grid Gauss–Seidel sweeps go on until no node changes at all.
 ///
 /// # Errors
-/// Cancelled.
-pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Result<DistanceMap> {
-    let cones = Cones::new(&field, start);
-    let seeds = start.seeds(&field);
+/// As [`Solver::solve`](super::Solver::solve).
+pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> Result<DistanceMap> {
+    let cones = Cones::new(&field, starts);
+    let seeds = source::seeds(&field, starts)?;
     let mut values = Values::seeded(&field, &seeds);
     let (cols, rows) = (field.cols(), field.rows());
     let mut changed = true;
@@ -54,7 +54,7 @@ pub fn solve(field: TensorField, start: &StartRegion, control: &Control) -> Resu
         cones,
         values,
         errors: None,
-        start: start.clone(),
+        starts: starts.into(),
         statistics,
         unit: "",
         frame: None,

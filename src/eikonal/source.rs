@@ -4,13 +4,13 @@ use glam::DVec2;
 
 use super::cone::Cone;
 use super::field::{AREA, TensorField};
-use super::update::segment;
-use crate::Sym2;
+use super::update::{UNREACHED, segment};
+use crate::{Error, Result, Sym2};
 
 /// Values that a tile's nodes have from the start, infinite where none.
 pub(super) type Seeds = [f32; AREA];
 
-/// Where distance is zero, in grid coordinates (column, row).
+/// Where ways begin, in grid coordinates (column, row).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StartRegion {
     /// Single points, on nodes or between them.
@@ -19,6 +19,8 @@ pub struct StartRegion {
     pub lines: Vec<Vec<DVec2>>,
     /// Areas: closed rings, inside by the even-odd rule.
     pub areas: Vec<Vec<Vec<DVec2>>>,
+    /// Distance already travelled there, in the unit of the metric: 0 or more. Default 0.
+    pub value: f64,
 }
 
 impl From<DVec2> for StartRegion {
@@ -33,7 +35,88 @@ pub(super) const POINT_RADIUS: f64 = 4.0;
 /// Around a line or the border of an area: enough that every triangle next to it has values.
 const LINE_RADIUS: f64 = 1.5;
 
+/// How far from the nearest point of a line the foot of a node on it is looked for, in cells.
+const REACH: f64 = 100.0;
+
+/// Start values of all regions in stored units: calls `set(col, row, value, region)` for nodes on and near them.
+///
+/// # Errors
+/// A value or a coordinate that is no number; no open node at any region.
+pub(super) fn seed_all(
+    field: &TensorField,
+    starts: &[StartRegion],
+    mut set: impl FnMut(usize, usize, f32, u32),
+) -> Result<()> {
+    let mut seeds = 0;
+    for (start, region) in starts.iter().zip(0..) {
+        start.check()?;
+        start.seed(field, |col, row, value| {
+            let value = value as f32;
+            if value < UNREACHED {
+                set(col, row, value, region);
+                seeds += 1;
+            }
+        });
+    }
+    if seeds == 0 {
+        return Err(Error::usage(
+            "no open ground at the start: it lies outside the grid, on a void or a barrier, or where the metric \
+             is too extreme to compute with, as around heights that no terrain has",
+        ));
+    }
+    Ok(())
+}
+
+/// Start values of the tiles that have some.
+///
+/// # Errors
+/// As [`seed_all`].
+pub(super) fn seeds(
+    field: &TensorField,
+    starts: &[StartRegion],
+) -> Result<Vec<Option<Box<Seeds>>>> {
+    let mut seeds = vec![None; field.tiling.tiles()];
+    seed_all(field, starts, |col, row, value, _| {
+        let (tile, place) = field.tiling.place(col, row);
+        let seeds: &mut Box<Seeds> =
+            seeds[tile].get_or_insert_with(|| Box::new([f32::INFINITY; AREA]));
+        seeds[place] = seeds[place].min(value);
+    })?;
+    Ok(seeds)
+}
+
+/// The best of [`StartRegion::foot`] over all regions.
+pub(super) fn foot_on_any(
+    starts: &[StartRegion],
+    field: &TensorField,
+    at: DVec2,
+    radius: f64,
+) -> Option<(DVec2, f64)> {
+    let feet = starts.iter().filter_map(|start| start.foot(field, at, radius));
+    feet.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
 impl StartRegion {
+    /// The same region with `value` travelled already.
+    #[must_use]
+    pub fn with_value(self, value: f64) -> Self {
+        Self { value, ..self }
+    }
+
+    fn check(&self) -> Result<()> {
+        if !(self.value.is_finite() && self.value >= 0.0) {
+            return Err(Error::usage(format!(
+                "the value of a start region is {}; it must be 0 or more",
+                self.value
+            )));
+        }
+        let points = self.points.iter().chain(self.lines.iter().flatten());
+        match points.chain(self.areas.iter().flatten().flatten()).find(|at| !at.is_finite()) {
+            Some(at) => Err(Error::usage(format!("the start {at} is no place on the grid"))),
+            None => Ok(()),
+        }
+    }
+
     /// Whether there is nothing in it.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -53,23 +136,13 @@ impl StartRegion {
         })
     }
 
-    /// Start values of the tiles that have some.
-    pub(super) fn seeds(&self, field: &TensorField) -> Vec<Option<Box<Seeds>>> {
-        let mut seeds = vec![None; field.tiling.tiles()];
-        self.seed(field, |col, row, value| {
-            let (tile, place) = field.tiling.place(col, row);
-            let seeds: &mut Box<Seeds> =
-                seeds[tile].get_or_insert_with(|| Box::new([f32::INFINITY; AREA]));
-            seeds[place] = seeds[place].min(value as f32);
-        });
-        seeds
-    }
-
     /// Start values in stored units: calls `set(col, row, value)` for nodes on and near the region.
     fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
+        let travelled = self.value * field.root_scale();
+        let mut set = |col, row, length| set(col, row, travelled + length);
         for (at, sides) in self.corners() {
-            let Some(cone) = Cone::new(field, at, sides) else { continue };
-            near(field, at, at, POINT_RADIUS, |col, row, node| {
+            let Some(cone) = Cone::new(field, at, sides, travelled) else { continue };
+            near(field, at, at, POINT_RADIUS, |col, row, node, _| {
                 if cone.holds(node - at)
                     && let Some(length) = geodesic(field, node, at)
                 {
@@ -78,12 +151,13 @@ impl StartRegion {
             });
         }
         for (a, b) in self.segments() {
-            near(field, a, b, LINE_RADIUS, |col, row, node| {
-                if let Some(metric) = field.metric(col, row)
-                    && let (_, theta) = segment(0.0, a - node, 0.0, b - node, metric)
-                    && let Some(length) = straight(field, node, a.lerp(b, theta))
-                {
-                    set(col, row, length);
+            near(field, a, b, LINE_RADIUS, |col, row, node, nearest| {
+                if let Some(metric) = field.metric(col, row) {
+                    let (_, theta) = segment(0.0, a - node, 0.0, b - node, metric);
+                    let away = (a.lerp(b, theta) - nearest).clamp_length_max(REACH);
+                    if let Some(length) = straight(field, node, nearest + away) {
+                        set(col, row, length);
+                    }
                 }
             });
         }
@@ -118,10 +192,11 @@ impl StartRegion {
     }
 
     /// The point of the region that a traveller at `at`, nearer than `radius` cells, can go to in a straight
-    /// line, and the length of that (stored units); the shortest of them.
-    pub(crate) fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
+    /// line, and the region's value with the length of that (stored units); the shortest of them.
+    fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
+        let travelled = self.value * field.root_scale();
         if self.covers(at) {
-            return Some((at, 0.0));
+            return Some((at, travelled));
         }
         let metric = field.metric_at(at)?;
         let feet = self.segments().map(|(a, b)| {
@@ -133,7 +208,7 @@ impl StartRegion {
             .copied()
             .chain(feet)
             .filter(|foot| foot.distance(at) <= radius)
-            .filter_map(|foot| Some((foot, straight(field, at, foot)?)))
+            .filter_map(|foot| Some((foot, travelled + straight(field, at, foot)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
@@ -142,13 +217,13 @@ fn closed_segments(ring: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ 
     (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]))
 }
 
-/// Open nodes within `radius` cells of the segment, or at the corners of the cells it runs through.
+/// Open nodes within `radius` cells of the segment, each with its nearest point on it.
 fn near(
     field: &TensorField,
     a: DVec2,
     b: DVec2,
     radius: f64,
-    mut visit: impl FnMut(usize, usize, DVec2),
+    mut visit: impl FnMut(usize, usize, DVec2, DVec2),
 ) {
     let span = |lo: f64, hi: f64, count: usize| {
         let first = (lo - radius).ceil().max(0.0) as usize;
@@ -159,8 +234,9 @@ fn near(
         for col in span(a.x.min(b.x), a.x.max(b.x), field.cols()) {
             let node = DVec2::new(col as f64, row as f64);
             let (_, theta) = segment(0.0, a - node, 0.0, b - node, Sym2::new(1.0, 0.0, 1.0));
-            if a.lerp(b, theta).distance(node) <= radius && field.is_open(col, row) {
-                visit(col, row, node);
+            let nearest = a.lerp(b, theta);
+            if nearest.distance(node) <= radius && field.is_open(col, row) {
+                visit(col, row, node, nearest);
             }
         }
     }

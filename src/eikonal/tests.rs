@@ -23,13 +23,15 @@ fn field(
 }
 
 fn solve(field: TensorField, start: DVec2) -> DistanceMap {
-    Solver::default().solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+    Solver::default()
+        .solve_field(field, &[start.into()], &Stop::Never, &Control::default())
+        .unwrap()
 }
 
 /// Without a tolerance, so that the order of the sweeps does not matter.
 fn exactly(field: TensorField, start: DVec2) -> DistanceMap {
     let solver = Solver { tolerance: 0.0, ..Solver::default() };
-    solver.solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+    solver.solve_field(field, &[start.into()], &Stop::Never, &Control::default()).unwrap()
 }
 
 /// Largest and mean error over all nodes for which `exact` is known, relative to the largest and mean distance.
@@ -149,7 +151,9 @@ fn lines_and_areas_are_start_regions() {
     // Distance to a straight line: |n·x| / √(nᵀ D n).
     let (a, b) = (DVec2::new(-200.0, 10.2), DVec2::new(300.0, 35.7));
     let line = StartRegion { lines: vec![vec![a, b]], ..StartRegion::default() };
-    let map = Solver::default().solve_field(f.clone(), &line, &[], &Control::default()).unwrap();
+    let map = Solver::default()
+        .solve_field(f.clone(), &[line], &Stop::Never, &Control::default())
+        .unwrap();
     let normal = (b - a).perp();
     let exact = |c, r| {
         let p = DVec2::new(c as f64, r as f64);
@@ -162,7 +166,7 @@ fn lines_and_areas_are_start_regions() {
     let square = vec![[20.0, 20.0], [40.0, 20.0], [40.0, 40.0], [20.0, 40.0]];
     let ring: Vec<DVec2> = square.into_iter().map(DVec2::from).collect();
     let area = StartRegion { areas: vec![vec![ring]], ..StartRegion::default() };
-    let map = Solver::default().solve_field(f, &area, &[], &Control::default()).unwrap();
+    let map = Solver::default().solve_field(f, &[area], &Stop::Never, &Control::default()).unwrap();
     assert_eq!(map.at_node(30, 30), 0.0);
     assert!((map.at_node(30, 50) - 10.0 / m.inverse().norm(DVec2::Y)).abs() < 1e-3);
 }
@@ -183,11 +187,14 @@ fn a_diagonal_wall_of_single_nodes_does_not_leak() {
 fn goals_end_the_solve_early_with_final_values() {
     let tensor = |c: usize, r: usize| Some(rotated(9.0, (c + 2 * r) as f64 * 0.01));
     let f = field(301, 301, tensor);
-    let (start, goals) = (StartRegion::from(DVec2::splat(40.0)), [DVec2::new(70.4, 61.7)]);
-    let whole = Solver::default().solve_field(f.clone(), &start, &[], &Control::default()).unwrap();
-    let part = Solver::default().solve_field(f, &start, &goals, &Control::default()).unwrap();
+    let (start, goal) = ([StartRegion::from(DVec2::splat(40.0))], DVec2::new(70.4, 61.7));
+    let whole = Solver::default()
+        .solve_field(f.clone(), &start, &Stop::Never, &Control::default())
+        .unwrap();
+    let stop = Stop::AllGoals(vec![goal]);
+    let part = Solver::default().solve_field(f, &start, &stop, &Control::default()).unwrap();
     assert!(part.statistics().activations * 3 < whole.statistics().activations);
-    assert_eq!(part.at(goals[0]), whole.at(goals[0]));
+    assert_eq!(part.at(goal), whole.at(goal));
 }
 
 #[test]
@@ -242,7 +249,7 @@ fn hopeless_starts_and_cancelling_are_errors() {
     let control = Control::default();
     let start = |at: DVec2| StartRegion::from(at);
     let run = |start: StartRegion, control: &Control| {
-        Solver::default().solve_field(f(), &start, &[], control)
+        Solver::default().solve_field(f(), &[start], &Stop::Never, control)
     };
     assert!(run(start(DVec2::new(4.0, 4.0)), &control).is_err());
     assert!(run(start(DVec2::new(50.0, 4.0)), &control).is_err());
@@ -250,6 +257,162 @@ fn hopeless_starts_and_cancelling_are_errors() {
     assert!(run(StartRegion::default(), &control).is_err());
     control.cancel.cancel();
     assert!(matches!(run(start(DVec2::ONE), &control), Err(Error::Cancelled)));
+}
+
+/// A map from several starts, each with its value.
+fn solve_from(field: TensorField, starts: &[(DVec2, f64)], stop: &Stop) -> DistanceMap {
+    let starts: Vec<_> =
+        starts.iter().map(|&(at, value)| StartRegion::from(at).with_value(value)).collect();
+    Solver::default().solve_field(field, &starts, stop, &Control::default()).unwrap()
+}
+
+#[test]
+fn the_nearest_start_wins_its_value_included() {
+    // Additively weighted Voronoi regions of a constant tensor; the last start is beaten on its own ground.
+    let starts = [
+        (DVec2::new(30.3, 40.8), 0.0),
+        (DVec2::new(120.0, 35.2), 12.5),
+        (DVec2::new(80.5, 110.0), 3.25),
+        (DVec2::new(60.0, 60.0), 1e4),
+    ];
+    for d in [IDENTITY * 1e-4, rotated(9.0, 0.6)] {
+        let distance = |c: usize, r: usize, (at, value): (DVec2, f64)| {
+            value + d.inverse().norm(DVec2::new(c as f64, r as f64) - at)
+        };
+        let map = solve_from(field(151, 141, |_, _| Some(d)), &starts, &Stop::Never);
+        let exact = |c, r| starts.iter().map(|&start| distance(c, r, start)).min_by(f64::total_cmp);
+        let (worst, mean) = errors(&map, exact);
+        assert!(worst < 5e-3 && mean < 2e-3, "{worst} {mean}");
+        let cell = d.inverse().norm(DVec2::new(1.0, 1.0));
+        let labels = map.labels();
+        for (i, label) in labels.into_iter().enumerate() {
+            let (c, r) = (i % 151, i / 151);
+            let label = label.unwrap() as usize;
+            let lost = distance(c, r, starts[label]) - exact(c, r).unwrap();
+            assert!(label < 3 && lost < cell, "({c}, {r}): {label} is {lost} too far");
+        }
+    }
+}
+
+#[test]
+fn one_list_of_starts_is_one_region_of_all() {
+    let f = || field(90, 70, |c, r| Some(rotated(1.0 + (c % 30) as f64, 0.05 * r as f64)));
+    let points = [DVec2::new(10.2, 60.0), DVec2::new(70.0, 20.9), DVec2::new(44.0, 33.3)];
+    let one = StartRegion { points: points.to_vec(), ..StartRegion::default() };
+    let control = Control::default();
+    let one = Solver::default().solve_field(f(), &[one], &Stop::Never, &control).unwrap();
+    let three = solve_from(f(), &points.map(|at| (at, 0.0)), &Stop::Never);
+    assert_eq!(one.values.tiles, three.values.tiles);
+    assert!(one.labels().iter().all(|&label| label == Some(0)));
+}
+
+#[test]
+fn a_start_value_adds_to_every_distance() {
+    let d = |c: usize, r: usize| Some(rotated(9.0, 0.01 * (c * r) as f64) * 1e6);
+    let at = DVec2::new(30.3, 20.0);
+    let plain = solve_from(field(90, 70, d), &[(at, 0.0)], &Stop::Never);
+    let later = solve_from(field(90, 70, d), &[(at, 0.01)], &Stop::Never);
+    let (worst, _) = errors(&later, |c, r| Some(plain.at_node(c, r) + 0.01));
+    assert!(worst < 1e-4, "{worst}");
+    assert!((later.at(at).unwrap() - 0.01).abs() < 1e-12);
+}
+
+/// A rough field with walls.
+fn rough(cols: usize, rows: usize) -> TensorField {
+    field(cols, rows, |c, r| {
+        let wall = (c / 9 + r / 7).is_multiple_of(5) && c % 9 < 6;
+        (!wall)
+            .then(|| rotated(1.0 + (c % 50) as f64, r as f64 * 0.1) * (1.0 + 0.1 * (r % 30) as f64))
+    })
+}
+
+/// The nodes of `part` that are reached have the value they have in `whole`; returns how many.
+fn assert_part(part: &DistanceMap, whole: &DistanceMap) -> usize {
+    let nodes = (0..part.rows()).flat_map(|row| (0..part.cols()).map(move |col| (col, row)));
+    let reached = nodes.filter(|&(c, r)| part.is_reached(c, r));
+    let check = |(c, r)| {
+        let (a, b) = (part.at_node(c, r), whole.at_node(c, r));
+        assert!((a - b).abs() <= 1e-4 * b, "({c}, {r}): {a} {b}");
+    };
+    reached.map(check).count()
+}
+
+#[test]
+fn what_a_stopped_solve_reports_is_final() {
+    let start = [(DVec2::new(100.0, 90.0), 0.0)];
+    let whole = solve_from(rough(260, 240), &start, &Stop::Never);
+    let goals = vec![DVec2::new(130.5, 120.0), DVec2::new(60.2, 90.9)];
+    let far = DVec2::new(250.0, 230.0);
+    for stop in [
+        Stop::AllGoals(goals.clone()),
+        Stop::AnyGoal(vec![far, goals[0]]),
+        Stop::Distance(20.0),
+        Stop::Nodes(5000),
+    ] {
+        let part = solve_from(rough(260, 240), &start, &stop);
+        assert!(part.statistics().activations * 2 < whole.statistics().activations, "{stop:?}");
+        let reached = assert_part(&part, &whole);
+        match stop {
+            Stop::AllGoals(goals) => assert!(goals.iter().all(|&goal| part.at(goal).is_some())),
+            Stop::AnyGoal(_) => assert!(part.at(goals[0]).is_some() && part.at(far).is_none()),
+            Stop::Distance(d) => {
+                let within = whole.to_row_major().iter().filter(|&&g| g <= d as f32).count();
+                assert!(reached.abs_diff(within) <= 2, "{reached} {within}");
+            }
+            Stop::Nodes(count) => assert!(reached >= count && reached < 3 * count, "{reached}"),
+            Stop::Never => unreachable!(),
+        }
+        let on = Solver::default().resume(part, &Stop::Never, &Control::default()).unwrap();
+        assert!(on.statistics().activations < whole.statistics().activations);
+        let (same, all) = (assert_part(&on, &whole), assert_part(&whole, &on));
+        assert_eq!(same, all);
+    }
+}
+
+#[test]
+fn stops_that_nothing_meets_solve_everything() {
+    let start = [(DVec2::new(8.0, 9.0), 0.0)];
+    let whole = solve_from(rough(60, 40), &start, &Stop::Never);
+    // Outside, behind a wall, beyond all.
+    let closed = DVec2::new(0.0, 0.0);
+    assert!(!whole.is_reached(0, 0));
+    for stop in [
+        Stop::AnyGoal(vec![DVec2::splat(1e9), closed]),
+        Stop::AnyGoal(vec![]),
+        Stop::AllGoals(vec![]),
+        Stop::Distance(f64::INFINITY),
+        Stop::Nodes(usize::MAX),
+    ] {
+        let part = solve_from(rough(60, 40), &start, &stop);
+        assert_eq!(part.values.tiles, whole.values.tiles, "{stop:?}");
+    }
+    let nowhere = solve_from(rough(60, 40), &start, &Stop::Distance(0.0));
+    assert_eq!((assert_part(&nowhere, &whole), nowhere.at_node(8, 9)), (1, 0.0));
+}
+
+#[test]
+fn numbers_out_of_range_are_refused() {
+    const OPEN: DVec2 = DVec2::new(8.0, 10.0);
+    let run = |start: StartRegion, stop: &Stop| {
+        let good = StartRegion::from(DVec2::new(8.0, 9.0));
+        Solver::default().solve_field(rough(20, 20), &[good, start], stop, &Control::default())
+    };
+    let at = |at: DVec2| StartRegion::from(at);
+    let line = |points: Vec<DVec2>| StartRegion { lines: vec![points], ..StartRegion::default() };
+    for value in [f64::NAN, f64::INFINITY, -1.0] {
+        assert!(run(at(OPEN).with_value(value), &Stop::Never).is_err());
+    }
+    for bad in [at(DVec2::NAN), at(DVec2::INFINITY), line(vec![OPEN, DVec2::NAN])] {
+        assert!(run(bad, &Stop::Never).is_err());
+    }
+    for d in [f64::NAN, -1.0] {
+        assert!(run(at(OPEN), &Stop::Distance(d)).is_err());
+    }
+    assert!(run(at(OPEN), &Stop::Never).is_ok());
+    assert!(
+        run(at(DVec2::splat(1e300)), &Stop::Never).is_ok(),
+        "one start out of sight is no error"
+    );
 }
 
 /// A tensor of ratio up to 100, or a wall.
@@ -270,10 +433,10 @@ proptest! {
         (x, y) in (0.0..23.0f64, 0.0..36.0f64),
     ) {
         let f = field(24, 37, |c, r| tensors[r * 24 + c]);
-        let start = StartRegion::from(DVec2::new(x, y));
+        let start = [StartRegion::from(DVec2::new(x, y))];
         let control = Control::default();
         let solver = Solver { tolerance: 0.0, ..Solver::default() };
-        let fast = solver.solve_field(f.clone(), &start, &[], &control);
+        let fast = solver.solve_field(f.clone(), &start, &Stop::Never, &control);
         let Ok(fast) = fast else {
             prop_assert!(!f.is_open(x.round() as usize, y.round() as usize));
             return Ok(());
@@ -294,17 +457,57 @@ proptest! {
         goal in (0.0..59.0f64, 0.0..49.0f64),
     ) {
         let f = field(60, 50, |c, r| tensors[r * 60 + c]);
-        let start = StartRegion::from(DVec2::new(x, y));
+        let start = [StartRegion::from(DVec2::new(x, y))];
         let goal = DVec2::from(goal);
         let solver = Solver { tolerance: 0.0, ..Solver::default() };
         let control = Control::default();
-        if let Ok(whole) = solver.solve_field(f.clone(), &start, &[], &control) {
-            let part = solver.solve_field(f, &start, &[goal], &control).unwrap();
+        if let Ok(whole) = solver.solve_field(f.clone(), &start, &Stop::Never, &control) {
+            let part = solver.solve_field(f, &start, &Stop::AllGoals(vec![goal]), &control).unwrap();
             match (part.at(goal), whole.at(goal)) {
                 // Some units in the last place of the `f32` of a node.
                 (Some(a), Some(b)) => prop_assert!((a - b).abs() <= 1e-6 * b, "{a} {b}"),
                 (a, b) => prop_assert_eq!(a, b),
             }
+        }
+    }
+
+    #[test]
+    fn stopped_and_resumed_is_solved_in_one_go(
+        tensors in proptest::collection::vec(any_tensor(), 60 * 50),
+        (x, y) in (0.0..59.0f64, 0.0..49.0f64),
+        share in 0.0..1.0f64,
+    ) {
+        let f = field(60, 50, |c, r| tensors[r * 60 + c]);
+        let start = [
+            StartRegion::from(DVec2::new(x, y)),
+            StartRegion::from(DVec2::new(y, x.min(49.0))).with_value(share),
+        ];
+        let solver = Solver { tolerance: 0.0, ..Solver::default() };
+        let control = Control::default();
+        if let Ok(whole) = solver.solve_field(f.clone(), &start, &Stop::Never, &control) {
+            let largest = whole.to_row_major().into_iter().filter(|g| g.is_finite()).fold(0.0, f32::max);
+            let stop = Stop::Distance(share * f64::from(largest));
+            let part = solver.solve_field(f, &start, &stop, &control).unwrap();
+            let near = |map: &DistanceMap, most: f64| {
+                let mut worst = 0f64;
+                for row in 0..50 {
+                    for col in 0..60 {
+                        let (a, b) = (map.at_node(col, row), whole.at_node(col, row));
+                        if a != b && (b < most || a.is_finite()) {
+                            worst = worst.max((a - b).abs() / b);
+                        }
+                    }
+                }
+                worst
+            };
+            let Stop::Distance(most) = stop else { unreachable!() };
+            prop_assert!(near(&part, most * (1.0 - 1e-5)) <= 1e-5);
+            let labels = part.labels();
+            for (i, label) in labels.into_iter().enumerate() {
+                prop_assert_eq!(label.is_some(), part.is_reached(i % 60, i / 60));
+            }
+            let on = solver.resume(part, &Stop::Never, &control).unwrap();
+            prop_assert!(near(&on, f64::INFINITY) <= 1e-5);
         }
     }
 

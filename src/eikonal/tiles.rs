@@ -12,6 +12,7 @@ use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
 use super::source::Seeds;
+use super::stop::{self, Standing, Stop};
 use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Tile, UNREACHED};
 use crate::{Control, Result};
 
@@ -28,13 +29,19 @@ impl Values {
         let fill = |tensors: &super::field::TensorTile| {
             tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY })
         };
-        let mut tiles: Vec<[f32; AREA]> = field.tiles.iter().map(fill).collect();
-        for (tile, seeds) in tiles.iter_mut().zip(seeds) {
+        let tiles = field.tiles.iter().map(fill).collect();
+        let mut values = Self { tiling: field.tiling, tiles };
+        values.seed(seeds);
+        values
+    }
+
+    /// Lowers values to those of the start.
+    pub(super) fn seed(&mut self, seeds: &[Option<Box<Seeds>>]) {
+        for (tile, seeds) in self.tiles.iter_mut().zip(seeds) {
             for (value, seed) in tile.iter_mut().zip(seeds.iter().flat_map(|seeds| seeds.iter())) {
                 *value = value.min(*seed);
             }
         }
-        Self { tiling: field.tiling, tiles }
     }
 
     pub(crate) fn get(&self, col: usize, row: usize) -> f32 {
@@ -236,21 +243,41 @@ struct Shared {
     taken: Vec<u32>,
 }
 
-/// Relaxes `values` to the solution of the discrete equation, starting from the tiles that hold any.
-///
-/// `done(is_final)` is asked between rounds whether what is final is enough. `None` if the values do not settle.
+/// Which of the values given to a solve are news.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum News<'a> {
+    /// All of them: they are those of the start.
+    All,
+    /// Those of and beside the nodes that are unreached here; the others are final.
+    Since(&'a Values),
+}
+
+/// What is to be solved, and to which share of a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Equation<'a> {
+    pub(super) field: &'a TensorField,
+    pub(super) cones: &'a Cones,
+    pub(super) seeds: &'a [Option<Box<Seeds>>],
+    pub(super) tolerance: f32,
+}
+
+/// Relaxes `values` to the solution of the discrete equation, starting from those that are `news`, until `stop` allows to
+/// end. What is not final then is unreached. `None` if the values do not settle.
 pub(super) fn solve(
-    field: &TensorField,
-    cones: &Cones,
-    seeds: &[Option<Box<Seeds>>],
-    tolerance: f32,
-    done: &dyn Fn(&dyn Fn(usize, usize) -> bool) -> bool,
+    &Equation { field, cones, seeds, tolerance }: &Equation<'_>,
+    values: Values,
+    news: News<'_>,
+    stop: &Stop,
     control: &Control,
 ) -> Result<Option<(Values, Statistics)>> {
     let tiling = field.tiling;
     let mut queue = Queue::new(tiling.tiles());
-    let values = Values::seeded(field, seeds);
-    wake_start(field, &values, &mut queue);
+    match news {
+        News::All => wake_start(field, &values, &mut queue),
+        News::Since(before) => wake_front(field, before, &values, &mut queue),
+    }
+    let mut reached = values.tiles.iter().map(reached_nodes).sum();
+    let mut least = f32::INFINITY;
     let window = WINDOW_CELLS * field.mean_step;
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
     let mut settles = true;
@@ -274,6 +301,10 @@ pub(super) fn solve(
                 *activations += 1;
                 statistics.tiles += usize::from(*activations == 1);
                 settles &= *activations < most;
+                if outcome.changed {
+                    reached -= reached_nodes(&values.tiles[tile as usize]);
+                    reached += reached_nodes(&outcome.values);
+                }
                 settle(&tiling, values, queue, tile as usize, outcome);
             }
             control.check()?;
@@ -283,21 +314,25 @@ pub(super) fn solve(
             if statistics.rounds.is_multiple_of(64) {
                 control.report("solving distance", statistics.tiles as f64 / tiling.tiles() as f64);
             }
-            let least = queue.least_key();
-            let is_final = |col: usize, row: usize| {
-                let value = values.get(col, row);
-                value + queue.limits[tiling.place(col, row).0].longest_step < least
-            };
+            least = queue.least_key();
+            let standing = Standing { field, values, limits: &queue.limits, reached, news: least };
             taken.clear();
-            if queue.waiting.is_empty() || done(&is_final) {
+            if queue.waiting.is_empty() || standing.allows(stop) {
                 return Ok(0);
             }
             statistics.rounds += 1;
             queue.take(&tiling, least + window, statistics.rounds as u32, taken);
             Ok(taken.len())
         };
-    let shared = crew::run(shared, lead, work)?;
-    Ok(settles.then_some((shared.values, statistics)))
+    let Shared { mut values, queue, .. } = crew::run(shared, lead, work)?;
+    if *stop != Stop::Never {
+        stop::mask(&mut values, field, &queue.limits, least, stop);
+    }
+    Ok(settles.then_some((values, statistics)))
+}
+
+fn reached_nodes(tile: &[f32; AREA]) -> usize {
+    tile.iter().filter(|&&value| value < UNREACHED).count()
 }
 
 /// Wakes every tile that holds a start value, and its neighbours, on all sides.
@@ -306,12 +341,34 @@ fn wake_start(field: &TensorField, values: &Values, queue: &mut Queue) {
         let least = values.tiles[tile].iter().copied().fold(UNREACHED, f32::min);
         if least < UNREACHED {
             queue.wake(tile, least, ITSELF);
-            for side in 0..8 {
-                let (dx, dy) = NEIGHBOURS[side];
+            for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
                 if let Some(n) = neighbour(&field.tiling, tile, dx, dy) {
                     queue.wake(n, least, opposite(side));
                 }
             }
+        }
+    }
+}
+
+/// Wakes every tile with a node that was unreached before, and now has a value or is beside one.
+fn wake_front(field: &TensorField, before: &Values, values: &Values, queue: &mut Queue) {
+    let mut block = [[f32::INFINITY; SIDE + 2]; SIDE + 2];
+    for tile in 0..field.tiling.tiles() {
+        if !before.tiles[tile].contains(&UNREACHED) {
+            continue;
+        }
+        values.block(tile, &mut block);
+        let beside = |row: usize, col: usize| {
+            (row - 1..=row + 1).flat_map(move |row| (col - 1..=col + 1).map(move |col| (row, col)))
+        };
+        let nodes = (1..=SIDE).flat_map(|row| (1..=SIDE).map(move |col| (row, col)));
+        let key = nodes
+            .filter(|&(row, col)| before.tiles[tile][(row - 1) * SIDE + col - 1] == UNREACHED)
+            .flat_map(|(row, col)| beside(row, col))
+            .map(|(row, col)| block[row][col])
+            .fold(UNREACHED, f32::min);
+        if key < UNREACHED {
+            queue.wake(tile, key, ITSELF);
         }
     }
 }
@@ -388,7 +445,7 @@ impl Workbench {
                 outcome.changed |= changes != [0; 2];
                 descending[side] = !descending[side];
             }
-            by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps % 2 == 0;
+            by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps.is_multiple_of(2);
         }
         outcome.settled = (owed, changes) == ([0; 2], [0; 2]);
         outcome.limits = self.bench.store(&mut self.block);

@@ -17,6 +17,8 @@
 //! [`segment`] is that minimum over one segment in plain form; [`sweep`] is the closed form over all eight at
 //! once, many nodes at a time.
 
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
+
 use glam::DVec2;
 use multiversion::multiversion;
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{Route, trace};
-use crate::{Control, DistanceMap, MetricField, Result, Solver, StartRegion};
+use crate::{Control, DistanceMap, MetricField, Result, Solver, StartRegion, Stop};
 
 /// The routes of several metrics between the same places, and what each costs under each.
 #[derive(Clone, Debug)]
@@ -17,19 +17,20 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Solves every metric from `start` over the whole grid and traces its route to `goal` (grid coordinates).
+    /// Solves every metric with `solver` from the nearest of `starts` over the whole grid and traces its route to `goal` (grid coordinates).
     ///
     /// # Errors
     /// [`Error::NoWay`](crate::Error::NoWay), and those of [`Solver::solve`].
     pub fn between(
+        solver: Solver,
         metrics: &[MetricField<'_>],
-        start: &StartRegion,
+        starts: &[StartRegion],
         goal: DVec2,
         control: &Control,
     ) -> Result<Self> {
         let distances: Vec<DistanceMap> = metrics
             .iter()
-            .map(|metric| Solver::default().solve(metric, start, &[], control))
+            .map(|metric| solver.solve(metric, starts, &Stop::Never, control))
             .collect::<Result<_>>()?;
         let routes: Vec<Route> = metrics
             .iter()

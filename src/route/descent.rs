@@ -98,7 +98,7 @@ fn descend_to_node(distance: &DistanceMap, at: DVec2) -> Option<(DVec2, f64)> {
 mod tests {
     use super::*;
     use crate::eikonal::TensorField;
-    use crate::{Control, Solver, Sym2};
+    use crate::{Control, Solver, Stop, Sym2};
 
     fn solve(
         n: usize,
@@ -106,7 +106,9 @@ mod tests {
         tensor: impl Fn(usize, usize) -> Option<Sym2> + Sync,
     ) -> DistanceMap {
         let field = TensorField::from_fn(n, n, tensor, &Control::default()).unwrap();
-        Solver::default().solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+        Solver::default()
+            .solve_field(field, &[start.into()], &Stop::Never, &Control::default())
+            .unwrap()
     }
 
     fn check(distance: &DistanceMap, start: DVec2, goal: DVec2) -> Vec<DVec2> {

@@ -76,7 +76,7 @@ impl Route {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Terrain};
+    use crate::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain};
 
     #[test]
     fn polishing_shortens_routes_on_real_ground() {
@@ -88,7 +88,8 @@ mod tests {
         {
             let field = metric.on(&surface, &Modifiers::default()).unwrap();
             let start = DVec2::new(100.0, 160.0);
-            let distance = Solver::default().solve(&field, &start.into(), &[], &control).unwrap();
+            let distance =
+                Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap();
             let ratios = (0..20).map(|k| {
                 let goal = start + 90.0 * DVec2::from_angle(0.3 * f64::from(k));
                 let traced = field.length(&descent::line(&distance, goal).unwrap());

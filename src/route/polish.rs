@@ -293,7 +293,7 @@ mod tests {
     use super::super::descent;
     use super::*;
     use crate::eikonal::{TensorField, sees};
-    use crate::{Control, DistanceMap, Solver};
+    use crate::{Control, DistanceMap, Solver, Stop};
 
     const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
 
@@ -301,7 +301,9 @@ mod tests {
     fn solve(n: usize, start: DVec2, metric: impl Fn(DVec2) -> Option<Sym2> + Sync) -> DistanceMap {
         let tensor = |c, r| Some(metric(DVec2::new(c as f64, r as f64))?.inverse());
         let field = TensorField::from_fn(n, n, tensor, &Control::default()).unwrap();
-        Solver::default().solve_field(field, &start.into(), &[], &Control::default()).unwrap()
+        Solver::default()
+            .solve_field(field, &[start.into()], &Stop::Never, &Control::default())
+            .unwrap()
     }
 
     fn cost(line: &[DVec2], metric: impl Fn(DVec2) -> Sym2) -> f64 {

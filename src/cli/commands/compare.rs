@@ -36,8 +36,14 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
         .into_iter()
         .map(|name| journey.field(name))
         .collect::<Result<Vec<_>>>()?;
-    let comparison = Comparison::between(&fields, &journey.start, goal.at, control)
-        .or_else(|error| journey.explain(error, &fields))?;
+    let comparison = Comparison::between(
+        args.ground.metric.solver(),
+        &fields,
+        &journey.regions,
+        goal.at,
+        control,
+    )
+    .or_else(|error| journey.explain(error, &fields))?;
     let table = table(&fields, &comparison).to_string();
     let summary = summary(&fields, &comparison, &journey);
     if let Some(folder) = &args.output {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use ridgeway::export::{Samples, isolines, isolines_geojson, levels_by_step, round_step};
-use ridgeway::{Control, DistanceMap, MetricField, Result};
+use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Stop};
 use serde_json::{Value, json};
 
-use crate::args::{DistanceArgs, RunArgs};
+use crate::args::{AccuracyName, DistanceArgs, RunArgs};
 use crate::output::{check_distinct, check_file, write_content, write_raster};
 use crate::plan::Journey;
 use crate::report::{Facts, Report, distance, wrote};
@@ -16,9 +16,14 @@ use crate::report::{Facts, Report, distance, wrote};
 const ISOLINES: usize = 20;
 
 pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Result<()> {
-    let outputs: Vec<_> = args.output.iter().chain(&args.isolines).collect();
+    let outputs: Vec<_> = args.output.iter().chain(&args.labels).chain(&args.isolines).collect();
     check_distinct(&outputs)?;
-    if let Some(path) = &args.output {
+    if args.error && args.ground.metric.accuracy == AccuracyName::Fast {
+        return Err(Error::usage(
+            "--error needs --accuracy high: only then the error is estimated",
+        ));
+    }
+    for path in args.output.iter().chain(&args.labels) {
         check_file(path, &["tif", "tiff"], args.overwrite, Some(&args.dem))?;
     }
     if let Some(path) = &args.isolines {
@@ -28,7 +33,8 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
-    let map = journey.solve(&field, true)?;
+    let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
+    let map = journey.solve(&field, &stop)?;
     control.check()?;
     let provenance = journey.provenance(std::slice::from_ref(&field));
     if let Some(path) = &args.isolines {
@@ -37,6 +43,12 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     }
     if let Some(path) = &args.output {
         write_map(path, args, &journey, &map)?;
+    }
+    if let Some(path) = &args.labels {
+        let labels: Vec<u32> =
+            map.labels().into_iter().map(|label| label.map_or(0, |label| label + 1)).collect();
+        let bands = [("nearest start".into(), Samples::U32(&labels))];
+        write_raster(path, args.overwrite, &journey.terrain, &bands)?;
     }
     let report = report(args, &journey, &field, &map, &provenance);
     let written: String = outputs.iter().map(|path| wrote(path)).collect();
@@ -66,6 +78,15 @@ fn write_map(
         let name = "direction of travel (degrees clockwise from north)".into();
         bands.push((name, Samples::F32Rows(&azimuths)));
     }
+    let errors = |row: usize, line: &mut [f32]| {
+        let nodes = line.iter_mut().enumerate();
+        nodes.for_each(|(col, value)| {
+            *value = map.error_at_node(col, row).map_or(f32::NAN, |error| error as f32);
+        });
+    };
+    if args.error {
+        bands.push((format!("estimated error ({})", map.unit()), Samples::F32Rows(&errors)));
+    }
     write_raster(path, args.overwrite, &journey.terrain, &bands)
 }
 
@@ -94,6 +115,14 @@ fn reached(map: &DistanceMap) -> (usize, f64) {
     };
     let both = |a: (usize, f64), b: (usize, f64)| (a.0 + b.0, a.1.max(b.1));
     (0..map.rows()).into_par_iter().map(of_row).reduce(|| (0, 0.0), both)
+}
+
+/// Mean of the estimated errors of the reached cells; `None` where there are none.
+fn mean_error(map: &DistanceMap) -> Option<f64> {
+    let nodes = (0..map.rows()).flat_map(|row| (0..map.cols()).map(move |col| (col, row)));
+    let errors = nodes.filter_map(|(col, row)| map.error_at_node(col, row));
+    let (sum, count) = errors.fold((0.0, 0usize), |(sum, count), error| (sum + error, count + 1));
+    (count > 0).then(|| sum / count as f64)
 }
 
 /// Distances that these shares of the reached cells do not exceed.
@@ -131,6 +160,11 @@ fn report(
     if reached > 0 {
         shown.push(("largest", largest));
     }
+    if args.stats
+        && let Some(error) = mean_error(map)
+    {
+        shown.push(("mean estimated error", error));
+    }
     for (name, value) in shown {
         facts.add(name, distance(value, unit));
         statistics.insert(name.replace(" %", "_percent"), value.into());
@@ -142,6 +176,20 @@ fn report(
             goals.push(json!({ "goal": goal.name, "distance": value }));
         }
     }
+    let work = map.statistics();
+    if args.stats {
+        let per_tile = |count: usize| count as f64 / work.tiles.max(1) as f64;
+        let activations = per_tile(work.activations);
+        facts.add(
+            "solver",
+            format!(
+                "{:.2} sweeps per node, {activations:.2} activations per tile, {} rounds, {} bytes per node",
+                per_tile(work.sweeps),
+                work.rounds,
+                map.bytes_per_node(),
+            ),
+        );
+    }
     Report {
         text: facts.to_string(),
         json: json!({
@@ -152,6 +200,13 @@ fn report(
             "reached": reached,
             "distance": statistics,
             "goals": goals,
+            "solver": {
+                "tiles": work.tiles,
+                "activations": work.activations,
+                "sweeps": work.sweeps,
+                "rounds": work.rounds,
+                "bytes_per_node": map.bytes_per_node(),
+            },
             "provenance": provenance,
         }),
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use ridgeway::export::{Isoline, isolines, levels_by_step, round_step};
 use ridgeway::render::{FieldPicture, Gradient, IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::route::trace;
-use ridgeway::{Control, DistanceMap, Error, HeightSurface, MetricField, Result, Route};
+use ridgeway::{Control, DistanceMap, Error, HeightSurface, MetricField, Result, Route, Stop};
 use serde_json::json;
 
 use crate::args::{Layer, Picture, RenderArgs, RunArgs};
@@ -61,7 +61,7 @@ fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>
     let places = (&args.start[..], &args.goal[..]);
     let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let fields = [journey.field(args.metric.unwrap_or(journey.default_metric()))?];
-    let distances = [journey.solve(&fields[0], true)?];
+    let distances = [journey.solve(&fields[0], &Stop::Never)?];
     let routes = journey
         .goals
         .iter()

@@ -25,7 +25,7 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
-    let map = journey.solve(&field, false)?;
+    let map = journey.solve(&field, &journey.all_goals())?;
     let to_goal = |goal: &Spot| {
         control.check()?;
         Ok((format!("to {}", goal.name), trace(&map, &field, goal.at)?))

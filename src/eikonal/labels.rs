@@ -1,0 +1,73 @@
+//! Which start region each node belongs to.
+
+use super::{DistanceMap, SLACK, best_foot, source};
+
+/// Not looked at yet.
+const UNKNOWN: u32 = u32::MAX;
+/// On the way that is being followed.
+const PENDING: u32 = u32::MAX - 1;
+/// No region: not reached.
+const NONE: u32 = u32::MAX - 2;
+
+impl DistanceMap {
+    /// The start region (its place in the list given to the solver) that each node, row-major from the north-west, is
+    /// nearest to; of equals, the first. `None` where not reached.
+    ///
+    /// A node has the region of the ring node nearest to the point its value came from, so borders between regions are
+    /// right to about a cell.
+    #[must_use]
+    pub fn labels(&self) -> Vec<Option<u32>> {
+        let cols = self.cols();
+        let mut labels = self.seed_labels();
+        let mut way = Vec::new();
+        for first in 0..labels.len() {
+            let mut at = first;
+            while labels[at] == UNKNOWN {
+                labels[at] = PENDING;
+                way.push(at);
+                match self.origin(at % cols, at / cols) {
+                    Some((col, row)) => at = row * cols + col,
+                    None => labels[at] = NONE,
+                }
+            }
+            // A way in a circle, where a step is lost in the rounding of the values, leads nowhere.
+            let label = if labels[at] == PENDING { NONE } else { labels[at] };
+            way.drain(..).for_each(|node| labels[node] = label);
+        }
+        labels.into_iter().map(|label| (label < NONE).then_some(label)).collect()
+    }
+
+    /// The labels of the nodes that kept their start value.
+    fn seed_labels(&self) -> Vec<u32> {
+        let mut labels = vec![UNKNOWN; self.cols() * self.rows()];
+        let seeds = |col: usize, row: usize, seed: f32, region: u32| {
+            let label = &mut labels[row * self.cols() + col];
+            if self.is_reached(col, row) && f64::from(seed) <= SLACK * self.stored(col, row) {
+                *label = region.min(*label);
+            }
+        };
+        // The map was seeded the same way without error.
+        let _ = source::seed_all(&self.field, &self.starts, seeds);
+        labels
+    }
+
+    /// Of the two ends of the segment that a node's value came from, the one nearer to the point it came from; the other,
+    /// if only that is lower than the node. `None` where not reached.
+    fn origin(&self, col: usize, row: usize) -> Option<(usize, usize)> {
+        if !self.is_reached(col, row) {
+            return None;
+        }
+        let (_, foot) = best_foot(&self.field, &self.cones, &self.values, col, row)?;
+        let near = foot.round();
+        // The foot lies between it and the end beyond.
+        let far = near + (foot - near).signum() * (foot - near).abs().ceil();
+        let ends = [near, far].map(|step| {
+            let col = col.checked_add_signed(step.x as isize).filter(|&col| col < self.cols());
+            let row = row.checked_add_signed(step.y as isize).filter(|&row| row < self.rows());
+            col.zip(row)
+        });
+        let lower = |&(c, r): &(usize, usize)| self.stored(c, r) < self.stored(col, row);
+        // Beside a cone taken out both may be higher; the nearer one still leads there.
+        ends.into_iter().flatten().find(lower).or(ends[0])
+    }
+}

@@ -1,0 +1,126 @@
+//! When a solve may end before all is reached.
+
+use glam::DVec2;
+
+use super::field::{AREA, TensorField};
+use super::tiles::Values;
+use super::update::{Limits, UNREACHED};
+use crate::{Error, Result};
+
+/// When to stop. Whatever the rule, what a map reports is final: the same as without it, but for the tolerance. All else is
+/// unreached.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Stop {
+    /// Once all that can be reached is.
+    #[default]
+    Never,
+    /// Once the distances around all of these points (grid coordinates) are final. One that cannot be reached makes it `Never`.
+    AllGoals(Vec<DVec2>),
+    /// Once the distance around any of these points is.
+    AnyGoal(Vec<DVec2>),
+    /// Once all nodes up to this distance, in the unit of the metric, are final. Nodes farther away are unreached.
+    Distance(f64),
+    /// Once at least so many nodes are final.
+    Nodes(usize),
+}
+
+impl Stop {
+    /// # Errors
+    /// A distance that is no number or negative.
+    pub(super) fn check(&self) -> Result<()> {
+        match *self {
+            Self::Distance(d) if d.is_nan() || d < 0.0 => {
+                Err(Error::usage(format!("the distance to stop at is {d}; it must be 0 or more")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The largest value to be reported, in stored units.
+    fn largest(&self, field: &TensorField) -> f32 {
+        match self {
+            Self::Distance(d) => (d * field.root_scale()).min(UNREACHED.into()) as f32,
+            _ => UNREACHED,
+        }
+    }
+}
+
+/// How far a solve has come.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Standing<'a> {
+    pub(super) field: &'a TensorField,
+    pub(super) values: &'a Values,
+    pub(super) limits: &'a [Limits],
+    /// Number of the nodes that have a value.
+    pub(super) reached: usize,
+    /// Nothing below this value is news to any node; infinite when all is done.
+    pub(super) news: f32,
+}
+
+impl Standing<'_> {
+    /// Whether the solve may end.
+    pub(super) fn allows(&self, stop: &Stop) -> bool {
+        match stop {
+            Stop::Never => false,
+            Stop::AllGoals(goals) => {
+                !goals.is_empty() && goals.iter().all(|&goal| self.is_settled(goal) != Some(false))
+            }
+            Stop::AnyGoal(goals) => goals.iter().any(|&goal| self.is_settled(goal) == Some(true)),
+            Stop::Distance(_) => {
+                // A node not reached by now is farther than the least news; one reached may still come down by its slack.
+                let slack = self.limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
+                self.news - slack > stop.largest(self.field)
+            }
+            Stop::Nodes(count) => self.reached >= *count && self.final_nodes() >= *count,
+        }
+    }
+
+    fn final_nodes(&self) -> usize {
+        let tiles = self.values.tiles.iter().zip(self.limits);
+        let count = |(tile, limits): (&[f32; AREA], &Limits)| {
+            tile.iter().filter(|&&value| is_final(value, limits, self.news)).count()
+        };
+        tiles.map(count).sum()
+    }
+
+    /// Whether the open corners of the goal's cell, and what their values come from, are final; `None` if there are none.
+    fn is_settled(&self, goal: DVec2) -> Option<bool> {
+        let field = self.field;
+        let (col, row) = (goal.x.max(0.0), goal.y.max(0.0));
+        let (west, east) = (col.floor() as usize, col.ceil() as usize);
+        let (north, south) = (row.floor() as usize, row.ceil() as usize);
+        let corners = [(west, north), (east, north), (west, south), (east, south)];
+        let open =
+            |&(c, r): &(usize, usize)| c < field.cols() && r < field.rows() && field.is_open(c, r);
+        let settled = |(c, r): (usize, usize)| {
+            let limits = &self.limits[field.tiling.place(c, r).0];
+            self.values.get(c, r) + limits.longest_step < self.news
+        };
+        let settled = corners.into_iter().filter(open).map(settled);
+        settled.fold(None, |all, corner| Some(all.unwrap_or(true) && corner))
+    }
+}
+
+/// Whether no news of this value and above will change a node: a neighbour improves it only if its value is below the
+/// node's and the slack.
+fn is_final(value: f32, limits: &Limits, news: f32) -> bool {
+    value < UNREACHED && value + limits.slack < news
+}
+
+/// Forgets all values that are not final while there is news, or are not to be reported.
+pub(super) fn mask(
+    values: &mut Values,
+    field: &TensorField,
+    limits: &[Limits],
+    news: f32,
+    stop: &Stop,
+) {
+    let largest = stop.largest(field);
+    for (tile, limits) in values.tiles.iter_mut().zip(limits) {
+        for value in tile.iter_mut().filter(|value| **value < UNREACHED) {
+            if *value > largest || !is_final(*value, limits, news) {
+                *value = UNREACHED;
+            }
+        }
+    }
+}
