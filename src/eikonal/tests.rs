@@ -283,7 +283,9 @@ fn the_nearest_start_wins_its_value_included() {
         let exact = |c, r| starts.iter().map(|&start| distance(c, r, start)).min_by(f64::total_cmp);
         let (worst, mean) = errors(&map, exact);
         assert!(worst < 5e-3 && mean < 2e-3, "{worst} {mean}");
-        let cell = d.inverse().norm(DVec2::new(1.0, 1.0));
+        // A border is right to a cell and the errors of the two distances that meet there.
+        let largest = map.to_row_major().into_iter().fold(0f32, f32::max);
+        let cell = d.inverse().norm(DVec2::new(1.0, 1.0)) + 2.0 * worst * f64::from(largest);
         let labels = map.labels();
         for (i, label) in labels.into_iter().enumerate() {
             let (c, r) = (i % 151, i / 151);
