@@ -13,7 +13,7 @@
 
 use glam::DVec2;
 
-use super::field::{AREA, SIDE, TensorField, TensorTile};
+use super::field::{SIDE, TensorField, TensorTile};
 use super::source::{POINT_RADIUS, StartRegion};
 use super::update::RING;
 use crate::Sym2;
@@ -23,10 +23,10 @@ use crate::Sym2;
 /// a mean error of 5.2, 2.3, .7, .3 e-4 (after one correction) and are alike on curvature tensors, which vary.
 const RADIUS: f64 = 0.2;
 
-/// The cone is taken out of tiles that are all like its point: the eigenvalues of `M(s) D` lie between the inverse of
-/// this and this, ...
+/// The cone is taken out as far as all ground is like that of its point: the eigenvalues of `M(s) D` lie between the
+/// inverse of this and this, ...
 const ALIKE: f32 = 1.3;
-/// ... and at nodes where they lie in this wider range and no shift is more than this share of a step. On another ground
+/// ... and farther out where they lie in this wider range and no shift is more than this share of a step. On another ground
 /// altogether the cone says nothing of the distance, and on rough ones large shifts would bring values below their
 /// neighbours' without end.
 const SIMILAR: f32 = 4.0;
@@ -42,6 +42,9 @@ pub(crate) struct Cone {
     pub(crate) sides: [DVec2; 2],
     /// Distance at the point, in stored units.
     travelled: f64,
+    /// In cells from the point: how far the cone is taken out, and how far all ground is alike.
+    pub(crate) radius: f64,
+    pub(crate) alike: f64,
 }
 
 impl Cone {
@@ -51,11 +54,12 @@ impl Cone {
         sides: [DVec2; 2],
         travelled: f64,
     ) -> Option<Self> {
-        Some(Self { at, metric: field.metric_at(at)?, sides, travelled })
+        let metric = field.metric_at(at)?;
+        Some(Self { at, metric, sides, travelled, radius: 0.0, alike: 0.0 })
     }
 
-    /// Whether the cone is to be taken out at a node of a tile that is not like its point: where `M(s) D` has this
-    /// trace and determinant, `D` this trace, and the largest shift this length.
+    /// Whether the cone is to be taken out at a node of unlike ground: where `M(s) D` has this trace and determinant,
+    /// `D` this trace, and the largest shift this length.
     #[inline(always)]
     pub(crate) fn applies(trace: f32, det: f32, trace_of_d: f32, shift: f32) -> bool {
         // No step is shorter than 1/√λ with the larger eigenvalue λ of D, λ ≤ tr D.
@@ -63,15 +67,31 @@ impl Cone {
         small & Self::in_range(trace, det, SIMILAR)
     }
 
-    /// Whether all open nodes of a tile are like the point.
-    fn is_like(&self, tile: &TensorTile) -> bool {
-        let (xx, xy, yy) = (self.metric.xx as f32, self.metric.xy as f32, self.metric.yy as f32);
-        let det0 = self.metric.det() as f32;
-        (0..AREA).all(|i| {
-            let (dxx, dxy, det) = (tile.xx[i], tile.xy[i], tile.det[i]);
-            let trace = xx * dxx + 2.0 * xy * dxy + yy * ((det + dxy * dxy) / dxx);
-            det == 0.0 || Self::in_range(trace, det * det0, ALIKE)
-        })
+    /// How far all ground is like that of the point, up to `most` cells.
+    fn alike(&self, field: &TensorField, most: f64) -> f64 {
+        let (col, row) = (self.at.x.round() as isize, self.at.y.round() as isize);
+        let unlike = |reach: isize| {
+            let along = -reach..=reach;
+            let mut ring = along.flat_map(|k| [(k, -reach), (k, reach), (-reach, k), (reach, k)]);
+            ring.any(|(dx, dy)| !self.is_like(field, col + dx, row + dy))
+        };
+        let first = (0..=most as isize).find(|&reach| unlike(reach));
+        first.map_or(most, |reach| (reach - 1).max(0) as f64)
+    }
+
+    /// Whether a node is like the point, or closed or outside.
+    fn is_like(&self, field: &TensorField, col: isize, row: isize) -> bool {
+        let (Ok(col), Ok(row)) = (usize::try_from(col), usize::try_from(row)) else { return true };
+        if col >= field.cols() || row >= field.rows() {
+            return true;
+        }
+        let (tile, i) = field.tiling.place(col, row);
+        let TensorTile { xx, xy, det } = &field.tiles[tile];
+        let (dxx, dxy, det) = (xx[i], xy[i], det[i]);
+        let m = self.metric;
+        let dyy = (det + dxy * dxy) / dxx;
+        let trace = m.xx as f32 * dxx + 2.0 * m.xy as f32 * dxy + m.yy as f32 * dyy;
+        det == 0.0 || Self::in_range(trace, det * m.det() as f32, ALIKE)
     }
 
     /// Whether both roots of `λ² − trace λ + det` lie between `1/most` and `most`.
@@ -103,20 +123,12 @@ impl Cone {
     }
 }
 
-/// The cone that a tile lies in.
-#[derive(Clone, Copy, Debug)]
-struct Here {
-    index: u32,
-    /// Whether the whole tile is like the point of the cone.
-    alike: bool,
-}
-
 /// The cones of the start regions, and which of them each tile lies in.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cones {
     cones: Vec<Cone>,
-    /// The tile's cone, if it lies in one. Empty if there are no cones.
-    of_tile: Vec<Option<Here>>,
+    /// Index of the tile's cone plus one; 0 if it lies in none. Empty if there are no cones.
+    of_tile: Vec<u32>,
 }
 
 impl Cones {
@@ -128,14 +140,19 @@ impl Cones {
                 .filter_map(|(at, sides)| Cone::new(field, at, sides, travelled))
                 .collect::<Vec<_>>()
         };
-        let cones: Vec<Cone> = starts.iter().flat_map(of_start).collect();
+        let mut cones: Vec<Cone> = starts.iter().flat_map(of_start).collect();
         let tiling = field.tiling;
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
         if cones.is_empty() || radius < POINT_RADIUS {
             return Self::default();
         }
-        let of_tile =
-            (0..tiling.tiles()).map(|tile| nearest(&cones, field, tile, radius)).collect();
+        // No more nodes are looked at than there are, however many cones.
+        let share = (tiling.cols * tiling.rows) as f64 / cones.len() as f64;
+        for cone in &mut cones {
+            cone.radius = radius;
+            cone.alike = cone.alike(field, radius.min(0.5 * share.sqrt()));
+        }
+        let of_tile = (0..tiling.tiles()).map(|tile| nearest(&cones, field, tile)).collect();
         Self { cones, of_tile }
     }
 
@@ -143,10 +160,10 @@ impl Cones {
         self.cones.is_empty()
     }
 
-    /// The cone that a tile lies in, and whether it is to be taken out of all its nodes.
-    pub(crate) fn of_tile(&self, tile: usize) -> Option<(&Cone, bool)> {
-        let here = (*self.of_tile.get(tile)?)?;
-        Some((&self.cones[here.index as usize], here.alike))
+    /// The cone that a tile lies in.
+    pub(crate) fn of_tile(&self, tile: usize) -> Option<&Cone> {
+        let index = self.of_tile.get(tile)?.checked_sub(1)?;
+        self.cones.get(index as usize)
     }
 
     /// The cone that is taken out at all the given nodes.
@@ -178,7 +195,7 @@ impl Cones {
         col: usize,
         row: usize,
     ) -> Option<(&Cone, DVec2, [f64; 8])> {
-        let (cone, alike) = self.of_tile(field.tiling.place(col, row).0)?;
+        let cone = self.of_tile(field.tiling.place(col, row).0)?;
         let v = DVec2::new(col as f64, row as f64) - cone.at;
         let shifts = RING.map(|(i, j)| {
             let by = DVec2::new(i.into(), j.into());
@@ -187,26 +204,27 @@ impl Cones {
         let (m, d) = (cone.metric, field.metric(col, row)?.inverse());
         let trace = m.xx * d.xx + 2.0 * m.xy * d.xy + m.yy * d.yy;
         let largest = -shifts.into_iter().fold(0.0, f64::min);
-        let applies = alike
+        let applies = v.length_squared() <= cone.alike * cone.alike
             || Cone::applies(
                 trace as f32,
                 (m.det() * d.det()) as f32,
                 (d.xx + d.yy) as f32,
                 largest as f32,
             );
-        (cone.holds(v) && applies).then_some((cone, v, shifts))
+        (cone.holds(v) && v.length_squared() <= cone.radius * cone.radius && applies)
+            .then_some((cone, v, shifts))
     }
 }
 
-/// The cone that brings the least distance to the middle of a tile under its own metric, if within `radius` cells: where
-/// a far one does, a nearer one that it beats must not be taken out.
-fn nearest(cones: &[Cone], field: &TensorField, tile: usize, radius: f64) -> Option<Here> {
-    let middle = field.tiling.first(tile) + 0.5 * (SIDE - 1) as f64;
+/// The cone that brings the least distance to the middle of a tile under its own metric, if it reaches into the tile, as for
+/// [`Cones::of_tile`]. Where a far one does, a nearer one that it beats must not be taken out.
+fn nearest(cones: &[Cone], field: &TensorField, tile: usize) -> u32 {
+    let half = 0.5 * (SIDE - 1) as f64;
+    let middle = field.tiling.first(tile) + half;
     let length = |cone: &Cone| cone.travelled + cone.value(middle - cone.at);
-    let all = cones.iter().enumerate();
-    let (index, cone) = all.min_by(|a, b| length(a.1).total_cmp(&length(b.1)))?;
-    (cone.at.distance(middle) <= radius)
-        .then(|| Here { index: index as u32, alike: cone.is_like(&field.tiles[tile]) })
+    let nearest = cones.iter().enumerate().min_by(|a, b| length(a.1).total_cmp(&length(b.1)));
+    let gap = |cone: &Cone| ((cone.at - middle).abs() - half).max(DVec2::ZERO).length();
+    nearest.filter(|(_, cone)| gap(cone) <= cone.radius).map_or(0, |(index, _)| index as u32 + 1)
 }
 
 #[cfg(test)]
@@ -219,6 +237,8 @@ mod tests {
             at: DVec2::ZERO,
             metric: Sym2::new(3.0, -1.0, 0.7),
             sides: [DVec2::ZERO; 2],
+            radius: 0.0,
+            alike: 0.0,
             travelled: 0.0,
         };
         for v in [DVec2::new(1.0, 2.0), DVec2::new(-7.0, 3.5), DVec2::new(0.3, -2.0)] {

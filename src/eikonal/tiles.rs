@@ -286,7 +286,7 @@ pub(super) fn solve(
     let work = |bench: &mut Workbench, shared: &Shared, index: usize, outcome: &mut Outcome| {
         let tile = shared.taken[index] as usize;
         let first = tiling.first(tile);
-        let cone = cones.of_tile(tile).map(|(cone, alike)| (cone, alike, first));
+        let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
         bench.solve(&tiling, &input, shared, tile, outcome);

@@ -241,8 +241,8 @@ impl Bench {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile<'a> {
     pub(crate) tensors: &'a TensorTile,
-    /// Cone that the tile lies in, whether it is to be taken out of all nodes, and the first node.
-    pub(crate) cone: Option<(&'a Cone, bool, DVec2)>,
+    /// Cone that the tile lies in, and the tile's first node.
+    pub(crate) cone: Option<(&'a Cone, DVec2)>,
     pub(crate) tolerance: f32,
     pub(crate) seeds: Option<&'a Seeds>,
 }
@@ -394,7 +394,7 @@ pub(super) fn prepare_shifts(
     shifts: &mut [[f32; SIDE]; 8],
     limits: &mut Limits,
 ) {
-    let Some((cone, alike, first)) = tile.cone else { return };
+    let Some((cone, first)) = tile.cone else { return };
     let turn = |v: DVec2| if how.by_columns { DVec2::new(v.y, v.x) } else { v };
     let from = turn(first - cone.at);
     let (m, sides) = (cone.metric, cone.sides.map(turn));
@@ -403,11 +403,13 @@ pub(super) fn prepare_shifts(
     let (xx, xy, yy) = (m.xx as f32, m.xy as f32, m.yy as f32);
     let (px, py, qx, qy) = (p.x as f32, p.y as f32, q.x as f32, q.y as f32);
     let det0 = m.det() as f32;
+    let (radius2, alike2) = ((cone.radius * cone.radius) as f32, (cone.alike * cone.alike) as f32);
     let [dxx, dxy, ddet] = tensors(tile, line, how);
     let mut largest = [0f32; SIDE];
     let (x0, y) = (from.x as f32, (from.y + line as f64) as f32);
     for i in 0..SIDE {
         let x = x0 + i as f32;
+        let r2 = x * x + y * y;
         let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
         let g2 = greatest(mx * x + my * y, 0.0);
         let g = g2.sqrt();
@@ -427,7 +429,8 @@ pub(super) fn prepare_shifts(
         let trace = xx * dxx[i] + 2.0 * xy * dxy[i] + yy * dyy;
         let applies = (px * x + py * y <= 0.0)
             & (qx * x + qy * y <= 0.0)
-            & (alike | Cone::applies(trace, ddet[i] * det0, dxx[i] + dyy, largest[i]));
+            & (r2 <= radius2)
+            & ((r2 <= alike2) | Cone::applies(trace, ddet[i] * det0, dxx[i] + dyy, largest[i]));
         largest[i] = choose(applies, largest[i], 0.0);
         for k in 0..8 {
             shifts[k][i] = choose(applies, shifts[k][i], 0.0);

@@ -66,7 +66,7 @@ impl Finder {
             patch(tiling, tile, 0.0, |t| &field.tiles[t].det),
         ];
         invert(&mut metric);
-        let cone = input.cones.of_tile(tile).map(|(cone, alike)| (cone, alike, tiling.first(tile)));
+        let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
         let seeds = input.seeds[tile].as_deref();
         let this = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
         for row in 0..SIDE {

@@ -77,7 +77,7 @@ fn minimise_line<const IN_CONE: bool>(
     let how = How { by_columns: false, descending: false };
     let [dxx, dxy, ddet] = tensors(tile, row, how);
     let (m0, from) = match tile.cone {
-        Some((cone, _, first)) => (
+        Some((cone, first)) => (
             [cone.metric.xx as f32, cone.metric.xy as f32, cone.metric.yy as f32],
             [(first.x - cone.at.x) as f32, (first.y + row as f64 - cone.at.y) as f32],
         ),
