@@ -252,6 +252,12 @@ fn a_tensor_raster_measures_as_its_tensor_says() {
     let expected = 900.0 / slope.sqrt();
     let found = distance("--tensor tensor.tif");
     assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
+    // As a cost the slope multiplies every length; along its row the plane rises 1 : 12.
+    folder.good("surface plane.tif --layers slope -o cost.tif");
+    let ratio = distance("--cost cost.tif --metric isotropic") / distance("--metric isotropic");
+    assert!((ratio / slope - 1.0).abs() < 1e-4, "{ratio} {slope}");
+    let line = "distance plane.tif --start pixel:5,5 --cost";
+    folder.bad(&format!("{line} tensor.tif"), 2, "tensor.tif: has 3 bands; a cost raster has one");
 }
 
 #[test]
