@@ -508,9 +508,11 @@ proptest! {
     fn agrees_with_the_reference_on_rough_fields(
         tensors in proptest::collection::vec(any_tensor(), 24 * 37),
         (x, y) in (0.0..23.0f64, 0.0..36.0f64),
+        (value, other) in (0.0..20.0f64, 0.0..23.0f64),
     ) {
         let f = field(24, 37, |c, r| tensors[r * 24 + c]);
-        let start = [StartRegion::from(DVec2::new(x, y))];
+        let second = StartRegion::from(DVec2::new(other, x)).with_value(value);
+        let start = [StartRegion::from(DVec2::new(x, y)), second];
         let control = Control::default();
         let solver = Solver { tolerance: 0.0 };
         let fast = solver.solve_field(f.clone(), &start, &Stop::Never, &control);
