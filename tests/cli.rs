@@ -181,6 +181,23 @@ fn distance_writes_rasters_isolines_and_statistics() {
 }
 
 #[test]
+fn labels_tell_the_starts_apart_and_a_largest_distance_ends_the_map() {
+    let folder = Folder::new();
+    let line = "distance range.tif --start pixel:5,20 --start pixel:55,20 --metric isotropic";
+    folder.good(&format!("{line} --labels l.tif -o d.tif --max-distance 600"));
+    let info = |file| -> Value {
+        serde_json::from_str(&folder.good(&format!("info {file} --json -q"))).unwrap()
+    };
+    let (labels, distance) = (info("l.tif"), info("d.tif"));
+    assert_eq!((&labels["min_height_m"], &labels["max_height_m"]), (&1.0.into(), &2.0.into()));
+    assert!(distance["max_height_m"].as_f64().unwrap() <= 600.0);
+    assert_eq!(labels["void_count"], distance["void_count"]);
+    assert!(labels["void_count"].as_u64().unwrap() > 500);
+    let negative = "invalid value '-1' for '--max-distance <VALUE>': expected a number, 0 or more";
+    folder.bad(&format!("{line} --max-distance -1"), 2, negative);
+}
+
+#[test]
 fn routes_end_where_they_were_asked_to() {
     let folder = Folder::new();
     let line = "route range.tif --start 500150,5000150 --start pixel:60,0 --goal huts.geojson \
@@ -235,6 +252,12 @@ fn a_tensor_raster_measures_as_its_tensor_says() {
     let expected = 900.0 / slope.sqrt();
     let found = distance("--tensor tensor.tif");
     assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
+    // As a cost the slope multiplies every length; along its row the plane rises 1 : 12.
+    folder.good("surface plane.tif --layers slope -o cost.tif");
+    let ratio = distance("--cost cost.tif --metric isotropic") / distance("--metric isotropic");
+    assert!((ratio / slope - 1.0).abs() < 1e-4, "{ratio} {slope}");
+    let line = "distance plane.tif --start pixel:5,5 --cost";
+    folder.bad(&format!("{line} tensor.tif"), 2, "tensor.tif: has 3 bands; a cost raster has one");
 }
 
 #[test]

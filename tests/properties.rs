@@ -273,3 +273,41 @@ fn routes_on_a_cylinder_and_a_sphere_are_exact() {
         assert!(cost < 1e-7 && far < 0.003, "sphere, {metric:?}: {cost:e}, {far} cells");
     }
 }
+
+#[test]
+fn costs_of_the_ground_refract_like_light() {
+    // A plane whose southern half costs three times as much: the way crosses the border where
+    // sin α = 3 sin β (Snell), that is, where its cost is least.
+    let n = 201;
+    let plain = terrain(n, n, DVec2::ONE, vec![0.0; n * n]);
+    let control = Control::default();
+    let surface = HeightSurface::fit(&plain, &FitOptions::default(), &control).unwrap();
+    let cost_at = |row: usize| if row < 100 { 1f32 } else { 3.0 };
+    let cost = |from: fn(f32) -> f32| -> Modifiers {
+        let cost = (0..n * n).map(|i| from(cost_at(i / n))).collect();
+        Modifiers { cost: Some(cost), ..Modifiers::default() }
+    };
+    let solve = |modifiers: &Modifiers| {
+        let field = Metric::Isotropic.on(&surface, modifiers).unwrap();
+        assert_eq!(field.unit(), if modifiers.cost.is_some() { "AG units" } else { "m" });
+        let start = DVec2::new(30.0, 20.0);
+        Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap()
+    };
+    let map = solve(&cost(|cost| cost));
+    for goal in [DVec2::new(30.0, 180.0), DVec2::new(150.0, 150.0), DVec2::new(190.0, 120.0)] {
+        // The border lies between rows 99 and 100, to half a cell.
+        let by = |x: f64| (x - 30.0).hypot(79.5) + 3.0 * (goal.x - x).hypot(goal.y - 99.5);
+        let exact = (0..=2000).map(|i| by(0.1 * f64::from(i))).fold(f64::INFINITY, f64::min);
+        let found = map.at(goal).unwrap();
+        assert!((found / exact - 1.0).abs() < 8e-3, "{goal}: {found}, exactly {exact}");
+    }
+    let (uniform, none) = (solve(&cost(|_| 3.0)), solve(&Modifiers::default()));
+    let ratio =
+        uniform.at(DVec2::new(111.0, 77.5)).unwrap() / none.at(DVec2::new(111.0, 77.5)).unwrap();
+    assert!((ratio - 3.0).abs() < 1e-4, "{ratio}");
+    let half = solve(&cost(|cost| if cost > 1.0 { f32::NAN } else { cost }));
+    assert!(half.at_node(100, 99).is_finite() && half.at_node(100, 100).is_infinite());
+    assert!(Metric::Isotropic.on(&surface, &cost(|_| 0.0)).is_err());
+    let short = Modifiers { cost: Some(vec![1.0; 5].into()), ..Modifiers::default() };
+    assert!(Metric::Isotropic.on(&surface, &short).is_err());
+}

@@ -361,6 +361,10 @@ pub(crate) struct MetricArgs {
     /// Lines and areas (GeoJSON) that may not be crossed; may be given several times.
     #[arg(long, value_name = "FILE.geojson")]
     pub(crate) barrier: Vec<PathBuf>,
+    /// What the ground costs: a raster on the DEM's grid with a factor above 0 on the length of every step;
+    /// cells without a value may not be entered.
+    #[arg(long, value_name = "FILE.tif")]
+    pub(crate) cost: Option<PathBuf>,
     /// Your own speed tensors: a float raster on the DEM's grid with bands D11, D12, D22, x east, y north.
     #[arg(long, value_name = "FILE.tif")]
     pub(crate) tensor: Option<PathBuf>,

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use ridgeway::terrain::read_bands;
 use ridgeway::{
-    Control, DistanceMap, Error, HeightSurface, Metric, MetricField, Modifiers, Result, Smoothing,
-    StartRegion, Stop, Sym2, Terrain,
+    Control, DistanceMap, Error, GridFrame, HeightSurface, Metric, MetricField, Modifiers, Result,
+    Smoothing, StartRegion, Stop, Sym2, Terrain,
 };
 use serde_json::{Value, json};
 
@@ -29,6 +29,7 @@ pub(crate) struct Journey<'a> {
     start_names: Vec<String>,
     barrier: Option<Arc<[bool]>>,
     tensors: Option<Arc<[Sym2]>>,
+    cost: Option<Arc<[f32]>>,
 }
 
 impl<'a> Journey<'a> {
@@ -52,6 +53,10 @@ impl<'a> Journey<'a> {
             Some(path) => Some(tensors(path, &terrain)?),
             None => None,
         };
+        let cost = match &args.metric.cost {
+            Some(path) => Some(costs(path, &terrain)?),
+            None => None,
+        };
         let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
         let start_names = start.iter().map(Place::to_string).collect();
         Ok(Self {
@@ -66,6 +71,7 @@ impl<'a> Journey<'a> {
             start_names,
             barrier,
             tensors,
+            cost,
         })
     }
 
@@ -97,10 +103,15 @@ impl<'a> Journey<'a> {
             climb_weight: self.args.metric.climb_weight,
             max_slope_deg: self.args.metric.max_slope,
             barrier: self.barrier.clone(),
+            cost: self.cost.clone(),
         };
         let field = metric.on(&self.surface, &modifiers)?;
         for spot in self.starts.iter().chain(&self.goals) {
             let why = match (name, self.args.metric.max_slope) {
+                _ if self.cost.is_some() => {
+                    "lies where the metric lets nobody enter: --cost or --tensor has no \
+                     value there, or the ground is steeper than --max-slope allows"
+                }
                 (MetricName::Tensor, Some(_)) => {
                     "lies where --tensor has no value or the ground is steeper than --max-slope allows"
                 }
@@ -172,6 +183,7 @@ impl<'a> Journey<'a> {
             "climb_weight": metric.climb_weight,
             "max_slope_deg": metric.max_slope,
             "barriers": metric.barrier.iter().map(|path| name(path)).collect::<Vec<_>>(),
+            "cost": metric.cost.as_deref().map(name),
             "tensor": metric.tensor.as_deref().map(name),
             "start": self.start_names,
             "goal": self.goals.iter().map(|goal| &goal.name).collect::<Vec<_>>(),
@@ -257,7 +269,22 @@ fn tensors(path: &Path, terrain: &Terrain) -> Result<Arc<[Sym2]>> {
             format!("has {found}; a tensor raster has three: D11, D12, D22"),
         ));
     };
-    let (theirs, ours) = (&raster.frame, terrain.frame());
+    check_grid(path, &raster.frame, terrain.frame())?;
+    Ok(xx.iter().zip(xy).zip(yy).map(|((&xx, &xy), &yy)| Sym2 { xx, xy, yy }).collect())
+}
+
+/// The costs of a one-band raster on the grid of the terrain.
+fn costs(path: &Path, terrain: &Terrain) -> Result<Arc<[f32]>> {
+    let raster = read_bands(path)?;
+    let [cost] = &raster.bands[..] else {
+        let found = raster.bands.len();
+        return Err(Error::format(path, format!("has {found} bands; a cost raster has one")));
+    };
+    check_grid(path, &raster.frame, terrain.frame())?;
+    Ok(cost.iter().map(|&cost| cost as f32).collect())
+}
+
+fn check_grid(path: &Path, theirs: &GridFrame, ours: &GridFrame) -> Result<()> {
     let apart = (theirs.origin() - ours.origin()).abs().max((theirs.step() - ours.step()).abs());
     if (theirs.cols(), theirs.rows()) != (ours.cols(), ours.rows())
         || apart.max_element() > 0.01 * ours.step().min_element()
@@ -278,7 +305,7 @@ fn tensors(path: &Path, terrain: &Terrain) -> Result<Arc<[Sym2]>> {
             ),
         ));
     }
-    Ok(xx.iter().zip(xy).zip(yy).map(|((&xx, &xy), &yy)| Sym2 { xx, xy, yy }).collect())
+    Ok(())
 }
 
 /// The command line, quoted for a shell.

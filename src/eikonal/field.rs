@@ -332,7 +332,9 @@ mod tests {
                     Metric::Tensor(tensors),
                 ] {
                     for climb_weight in [0.0, 30.0] {
-                        let modifiers = Modifiers { climb_weight, ..Modifiers::default() };
+                        let cost = (0..53 * 37).map(|i| 1.5 + (i as f32).cos()).collect();
+                        let cost = (climb_weight > 0.0).then_some(cost);
+                        let modifiers = Modifiers { climb_weight, cost, ..Modifiers::default() };
                         let metric = metric.on(&surface, &modifiers).unwrap();
                         let difference = difference(&metric);
                         assert!(difference < 1e-6, "{kind:?} {} {difference:e}", metric.name());

@@ -50,6 +50,9 @@ pub(super) fn seed_all(
     let mut seeds = 0;
     for (start, region) in starts.iter().zip(0..) {
         start.check()?;
+        if field.tiling.tiles() == 0 {
+            break;
+        }
         start.seed(field, |col, row, value| {
             let value = value as f32;
             if value < UNREACHED {

@@ -257,6 +257,25 @@ fn hopeless_starts_and_cancelling_are_errors() {
     assert!(run(StartRegion::default(), &control).is_err());
     control.cancel.cancel();
     assert!(matches!(run(start(DVec2::ONE), &control), Err(Error::Cancelled)));
+    let part = solve_from(f(), &[(DVec2::ONE, 0.0)], &Stop::Distance(2.0));
+    let on = Solver::default().resume(part, &Stop::Never, &control);
+    assert!(matches!(on, Err(Error::Cancelled)));
+}
+
+#[test]
+fn cancelling_in_the_middle_leaves_nothing() {
+    let control = Control::default();
+    let cancel = control.cancel.clone();
+    let progress = move |_: &str, done: f64| {
+        if done > 0.2 {
+            cancel.cancel();
+        }
+    };
+    let f = rough(300, 300);
+    let control = Control { progress: Some(std::sync::Arc::new(progress)), ..control };
+    let start = [StartRegion::from(DVec2::new(8.0, 9.0))];
+    let map = Solver::default().solve_field(f, &start, &Stop::Never, &control);
+    assert!(matches!(map, Err(Error::Cancelled)));
 }
 
 /// A map from several starts, each with its value.
@@ -283,9 +302,8 @@ fn the_nearest_start_wins_its_value_included() {
         let exact = |c, r| starts.iter().map(|&start| distance(c, r, start)).min_by(f64::total_cmp);
         let (worst, mean) = errors(&map, exact);
         assert!(worst < 5e-3 && mean < 2e-3, "{worst} {mean}");
-        // A border is right to a cell and the errors of the two distances that meet there.
-        let largest = map.to_row_major().into_iter().fold(0f32, f32::max);
-        let cell = d.inverse().norm(DVec2::new(1.0, 1.0)) + 2.0 * worst * f64::from(largest);
+        let diagonals = [DVec2::ONE, DVec2::new(1.0, -1.0)];
+        let cell = diagonals.map(|v| d.inverse().norm(v)).into_iter().fold(0.0, f64::max);
         let labels = map.labels();
         for (i, label) in labels.into_iter().enumerate() {
             let (c, r) = (i % 151, i / 151);
@@ -417,6 +435,63 @@ fn numbers_out_of_range_are_refused() {
     );
 }
 
+/// A number of the kind that breaks programs, now and then.
+fn any_number(usual: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
+    let rare = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e-300, 1e300, 1e18];
+    prop_oneof![50 => usual, 1 => proptest::sample::select(rare.to_vec())]
+}
+
+/// A tensor of ratio up to 1e6 at very different speeds, one that is none, or a wall.
+fn wild_tensor() -> impl Strategy<Value = Option<Sym2>> {
+    prop_oneof![
+        1 => Just(None),
+        8 => (0.0..1e6f64.ln(), 0.0..TAU, -8.0..8f64)
+            .prop_map(|(ratio, angle, speed)| Some(rotated(ratio.exp(), angle) * speed.exp())),
+        1 => (any_number(-1.0..2.0), any_number(-1.0..1.0), any_number(-1.0..2.0))
+            .prop_map(|(xx, xy, yy)| Some(Sym2::new(xx, xy, yy))),
+    ]
+}
+
+/// A start inside, at the border or outside of a grid of `cols × rows`, of any kind and with any value.
+fn wild_start(cols: usize, rows: usize) -> impl Strategy<Value = StartRegion> {
+    let coordinate = |count: usize| {
+        let last = (count as f64 - 1.0).max(0.1);
+        prop_oneof![3 => any_number(-3.0..last + 3.0), 1 => Just(last), 1 => Just(0.0)]
+    };
+    let point = (coordinate(cols), coordinate(rows)).prop_map(|(x, y)| DVec2::new(x, y));
+    let line = proptest::collection::vec(point, 0..4);
+    (proptest::collection::vec(line, 3), any_number(0.0..9.0), any::<bool>()).prop_map(
+        |(mut lines, value, point)| {
+            let points = lines.pop().unwrap_or_default();
+            let areas = if point { vec![] } else { vec![lines.split_off(1)] };
+            StartRegion { points, lines, areas, value: if point { 0.0 } else { value } }
+        },
+    )
+}
+
+fn wild_problem() -> impl Strategy<Value = (usize, usize, Vec<Option<Sym2>>, Vec<StartRegion>)> {
+    let sizes = [(1, 1), (1, 40), (33, 1), (17, 1), (2, 2), (17, 17), (16, 33), (40, 25), (0, 3)];
+    proptest::sample::select(sizes.to_vec()).prop_flat_map(|(cols, rows)| {
+        let tensors = proptest::collection::vec(wild_tensor(), cols * rows);
+        let starts = proptest::collection::vec(wild_start(cols, rows), 0..4);
+        (Just(cols), Just(rows), tensors, starts)
+    })
+}
+
+fn any_stop() -> impl Strategy<Value = Stop> {
+    let goals = || {
+        let goal = (any_number(-2.0..40.0), any_number(-2.0..40.0));
+        proptest::collection::vec(goal.prop_map(|(x, y)| DVec2::new(x, y)), 0..3)
+    };
+    prop_oneof![
+        Just(Stop::Never),
+        goals().prop_map(Stop::AllGoals),
+        goals().prop_map(Stop::AnyGoal),
+        any_number(0.0..20.0).prop_map(Stop::Distance),
+        (0..2000usize).prop_map(Stop::Nodes),
+    ]
+}
+
 /// A tensor of ratio up to 100, or a wall.
 fn any_tensor() -> impl Strategy<Value = Option<Sym2>> {
     prop_oneof![
@@ -433,9 +508,11 @@ proptest! {
     fn agrees_with_the_reference_on_rough_fields(
         tensors in proptest::collection::vec(any_tensor(), 24 * 37),
         (x, y) in (0.0..23.0f64, 0.0..36.0f64),
+        (value, other) in (0.0..20.0f64, 0.0..23.0f64),
     ) {
         let f = field(24, 37, |c, r| tensors[r * 24 + c]);
-        let start = [StartRegion::from(DVec2::new(x, y))];
+        let second = StartRegion::from(DVec2::new(other, x)).with_value(value);
+        let start = [StartRegion::from(DVec2::new(x, y)), second];
         let control = Control::default();
         let solver = Solver { tolerance: 0.0, ..Solver::default() };
         let fast = solver.solve_field(f.clone(), &start, &Stop::Never, &control);
@@ -471,6 +548,29 @@ proptest! {
                 (a, b) => prop_assert_eq!(a, b),
             }
         }
+    }
+
+    #[test]
+    fn wild_input_gives_an_answer_or_an_error(
+        (cols, rows, tensors, starts) in wild_problem(),
+        stop in any_stop(),
+        at in (any_number(-1.0..40.0), any_number(-1.0..40.0)),
+    ) {
+        let f = field(cols, rows, |c, r| tensors[r * cols + c]);
+        let solver = Solver::default();
+        let control = Control::default();
+        let Ok(map) = solver.solve_field(f, &starts, &stop, &control) else { return Ok(()) };
+        for (i, g) in map.to_row_major().into_iter().enumerate() {
+            prop_assert!(g >= 0.0, "{g}");
+            prop_assert!(g.is_infinite() || map.field.is_open(i % cols, i / cols));
+            let _ = map.direction(i % cols, i / cols);
+        }
+        prop_assert!(map.at(DVec2::from(at)).is_none_or(|g| g >= 0.0));
+        for (label, g) in map.labels().into_iter().zip(map.to_row_major()) {
+            prop_assert!(label.is_none_or(|label| (label as usize) < starts.len() && g.is_finite()));
+        }
+        let on = solver.resume(map, &Stop::Never, &control);
+        prop_assert!(on.is_err() || on.is_ok_and(|on| on.to_row_major().iter().all(|g| *g >= 0.0)));
     }
 
     #[test]

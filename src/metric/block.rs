@@ -27,6 +27,12 @@ impl SpeedBlock {
         self.det[row][i] = det;
     }
 
+    /// Multiplies the tensor in column `i` of row `row` by `factor`.
+    pub(super) fn scale(&mut self, row: usize, i: usize, factor: f64) {
+        let (d, det) = self.get(row, i);
+        self.set(row, i, (d * factor, det * factor * factor));
+    }
+
     #[inline(always)]
     fn get(&self, row: usize, i: usize) -> (Sym2, f64) {
         (Sym2::new(self.xx[row][i], self.xy[row][i], self.yy[row][i]), self.det[row][i])

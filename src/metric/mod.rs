@@ -99,6 +99,10 @@ pub struct Modifiers {
     pub max_slope_deg: Option<f64>,
     /// Nodes that may not be entered, row-major from the north-west. Default: none.
     pub barrier: Option<Arc<[bool]>>,
+    /// Cost of the ground at the nodes, row-major from the north-west: a factor above 0 on the length of every step, so
+    /// `D` is divided by its square. A node whose cost is not finite is a barrier. Between nodes it is bilinear.
+    /// Default: 1 everywhere.
+    pub cost: Option<Arc<[f32]>>,
 }
 
 /// A metric bound to a surface: the speed tensor `D` everywhere, and where one may go.
@@ -107,6 +111,7 @@ pub struct MetricField<'a> {
     surface: &'a HeightSurface,
     speed: Speed,
     climb_weight: f64,
+    cost: Option<Arc<[f32]>>,
     /// Row-major; empty if all are open.
     open: Vec<bool>,
 }
@@ -123,7 +128,7 @@ impl Metric {
     ///
     /// # Errors
     /// A `δ`, climb weight or slope out of range; a raster whose size is not the surface's; a tensor that
-    /// is finite but not positive definite.
+    /// is finite but not positive definite; a cost that is finite but not positive.
     pub fn on<'a>(
         &self,
         surface: &'a HeightSurface,
@@ -143,8 +148,32 @@ impl Metric {
                 "the climb weight is {climb_weight}; it must be 0 or more"
             )));
         }
+        let cost = modifiers.cost.clone();
+        if let Some(cost) = &cost {
+            check_costs(surface, cost)?;
+        }
         let open = open_nodes(surface, &speed, modifiers)?;
-        Ok(MetricField { surface, speed, climb_weight, open })
+        Ok(MetricField { surface, speed, climb_weight, cost, open })
+    }
+}
+
+fn check_costs(surface: &HeightSurface, costs: &[f32]) -> Result<()> {
+    let frame = surface.frame();
+    if costs.len() != frame.nodes() {
+        return Err(Error::usage(format!(
+            "the cost raster has {} cells, the terrain {}; they must cover the same grid",
+            costs.len(),
+            frame.nodes()
+        )));
+    }
+    match costs.iter().position(|cost| cost.is_finite() && *cost <= 0.0) {
+        None => Ok(()),
+        Some(i) => Err(Error::usage(format!(
+            "the cost {} at column {}, row {} is not above 0 (use NaN or nodata for barriers)",
+            costs[i],
+            i % frame.cols(),
+            i / frame.cols()
+        ))),
     }
 }
 
@@ -201,6 +230,7 @@ fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> 
     let all_open = !surface.has_voids()
         && barrier.is_none()
         && steepest.is_none()
+        && modifiers.cost.is_none()
         && !matches!(speed, Speed::Tensor(_));
     if all_open {
         return Ok(Vec::new());
@@ -217,6 +247,7 @@ fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> 
             let i = frame.index(col, row);
             *open = !surface.is_void(col, row)
                 && !barrier.is_some_and(|b| b[i])
+                && modifiers.cost.as_ref().is_none_or(|cost| cost[i].is_finite())
                 && !jets.as_ref().is_some_and(|(jets, limit)| too_steep(&jets[col], *limit))
                 && !matches!(speed, Speed::Tensor(d) if !d[i].is_positive_definite());
         }
@@ -241,12 +272,12 @@ impl<'a> MetricField<'a> {
         }
     }
 
-    /// Unit of the distance: `m` for isotropic without climb weight, `AG units` (anisotropic geodesic)
+    /// Unit of the distance: `m` for isotropic without climb weight and cost, `AG units` (anisotropic geodesic)
     /// otherwise. For the curvature metric an AG unit is `m·√(1/m)`.
     #[must_use]
     pub fn unit(&self) -> &'static str {
         match self.speed {
-            Speed::Isotropic if self.climb_weight == 0.0 => "m",
+            Speed::Isotropic if self.climb_weight == 0.0 && self.cost.is_none() => "m",
             _ => "AG units",
         }
     }
@@ -270,7 +301,8 @@ impl<'a> MetricField<'a> {
     /// derivatives there. Where closed, that of the continued surface.
     #[must_use]
     pub fn speed(&self, at: DVec2) -> Sym2 {
-        self.speed_of(&self.surface.jet(at), |tensors| self.bilinear(tensors, at))
+        let speed = self.speed_of(&self.surface.jet(at), |tensors| self.bilinear(tensors, at));
+        self.cost.as_ref().map_or(speed, |cost| speed * self.cost_at(cost, at).powi(-2))
     }
 
     /// Speed tensors at the nodes of the block whose first is `(col, row)`; nodes beyond the grid are closed.
@@ -287,6 +319,14 @@ impl<'a> MetricField<'a> {
             }
         }
         block::of_jets(&self.speed, self.climb_weight, speeds);
+        if let Some(cost) = &self.cost {
+            for j in 0..rows {
+                let start = frame.index(col, row + j);
+                for (i, cost) in cost[start..start + cols].iter().enumerate() {
+                    speeds.scale(j, i, f64::from(*cost).powi(-2));
+                }
+            }
+        }
         for (j, det) in speeds.det.iter_mut().enumerate() {
             if j >= rows {
                 *det = [0.0; BLOCK];
@@ -318,21 +358,35 @@ impl<'a> MetricField<'a> {
     }
 
     fn bilinear(&self, tensors: &[Sym2], at: DVec2) -> Sym2 {
+        self.corners(at)
+            .into_iter()
+            .map(|(i, weight)| (tensors[i], weight))
+            .filter(|(d, weight)| *weight > 0.0 && d.is_positive_definite())
+            .fold(Sym2::default(), |sum, (d, weight)| sum + d * weight)
+    }
+
+    /// Bilinear over the corners of the cell that have a cost; 1 if none has.
+    fn cost_at(&self, costs: &[f32], at: DVec2) -> f64 {
+        let known = self.corners(at).map(|(i, weight)| (f64::from(costs[i]), weight));
+        let known = known.into_iter().filter(|(cost, _)| cost.is_finite());
+        let (sum, total) =
+            known.fold((0.0, 0.0), |(sum, total), (cost, w)| (sum + w * cost, total + w));
+        if total > 0.0 { sum / total } else { 1.0 }
+    }
+
+    /// The corners of the cell around grid coordinates as places in a raster, each with its bilinear weight.
+    fn corners(&self, at: DVec2) -> [(usize, f64); 4] {
         let frame = self.surface.frame();
         let at = frame.clamp(at);
         let (col, row) = (at.x as usize, at.y as usize);
         let (east, south) = ((col + 1).min(frame.cols() - 1), (row + 1).min(frame.rows() - 1));
         let (u, v) = (at.x - col as f64, at.y - row as f64);
-        let d = |col, row| tensors[frame.index(col, row)];
         [
-            (d(col, row), (1.0 - u) * (1.0 - v)),
-            (d(east, row), u * (1.0 - v)),
-            (d(col, south), (1.0 - u) * v),
-            (d(east, south), u * v),
+            (frame.index(col, row), (1.0 - u) * (1.0 - v)),
+            (frame.index(east, row), u * (1.0 - v)),
+            (frame.index(col, south), (1.0 - u) * v),
+            (frame.index(east, south), u * v),
         ]
-        .into_iter()
-        .filter(|(d, weight)| *weight > 0.0 && d.is_positive_definite())
-        .fold(Sym2::default(), |sum, (d, weight)| sum + d * weight)
     }
 
     /// Cost under this metric of a step `by` (grid coordinates) around grid coordinates `at`: `√(vᵀ M v)`.

@@ -98,7 +98,7 @@ fn descend_to_node(distance: &DistanceMap, at: DVec2) -> Option<(DVec2, f64)> {
 mod tests {
     use super::*;
     use crate::eikonal::TensorField;
-    use crate::{Control, Solver, Stop, Sym2};
+    use crate::{Control, Solver, StartRegion, Stop, Sym2};
 
     fn solve(
         n: usize,
@@ -138,6 +138,26 @@ mod tests {
                     line.iter().map(|p| (*p - start).perp_dot(along).abs()).fold(0.0, f64::max);
                 assert!(stray < 1.5, "ratio {ratio}, goal {goal}: {stray} cells");
             }
+        }
+    }
+
+    #[test]
+    fn lines_lead_to_the_start_that_won() {
+        let field = TensorField::from_fn(
+            81,
+            61,
+            |_, _| Some(Sym2::new(1.0, 0.0, 1.0)),
+            &Control::default(),
+        );
+        let (near, far) = (DVec2::new(50.2, 30.0), DVec2::new(10.0, 30.7));
+        let starts = [StartRegion::from(near).with_value(25.0), StartRegion::from(far)];
+        let solver = Solver::default();
+        let map =
+            solver.solve_field(field.unwrap(), &starts, &Stop::Never, &Control::default()).unwrap();
+        // The second start wins where it is less than 25 cells farther away.
+        for (goal, home) in [(DVec2::new(40.0, 30.0), far), (DVec2::new(60.0, 33.0), near)] {
+            let line = line(&map, goal).unwrap();
+            assert_eq!((line[0], line[line.len() - 1]), (home, goal));
         }
     }
 
