@@ -12,6 +12,7 @@
 //! still `g`, and first order is clean. (Additive factoring: Luo and Qian, J. Comput. Phys. 230 (2011), 5.)
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::field::{SIDE, TensorField, TensorTile};
 use super::source::{POINT_RADIUS, StartRegion};
@@ -152,7 +153,8 @@ impl Cones {
             cone.radius = radius;
             cone.alike = cone.alike(field, radius.min(0.5 * share.sqrt()));
         }
-        let of_tile = (0..tiling.tiles()).map(|tile| nearest(&cones, field, tile)).collect();
+        let of_tile =
+            (0..tiling.tiles()).into_par_iter().map(|tile| nearest(&cones, field, tile)).collect();
         Self { cones, of_tile }
     }
 

@@ -8,6 +8,8 @@
 //!
 //! Jeong and Whitaker, "A Fast Iterative Method for Eikonal Equations", SIAM J. Sci. Comput. 30 (2008).
 
+use rayon::prelude::*;
+
 use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
@@ -29,7 +31,7 @@ impl Values {
         let fill = |tensors: &super::field::TensorTile| {
             tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY })
         };
-        let tiles = field.tiles.iter().map(fill).collect();
+        let tiles = field.tiles.par_iter().map(fill).collect();
         let mut values = Self { tiling: field.tiling, tiles };
         values.seed(seeds);
         values
@@ -273,10 +275,12 @@ pub(super) fn solve(
     let tiling = field.tiling;
     let mut queue = Queue::new(tiling.tiles());
     match news {
-        News::All => wake_start(field, &values, &mut queue),
+        News::All => wake_start(field, seeds, &mut queue),
         News::Since(before) => wake_front(field, before, &values, &mut queue),
     }
-    let mut reached = values.tiles.iter().map(reached_nodes).sum();
+    // Only that rule asks for it.
+    let counts = matches!(stop, Stop::Nodes(_));
+    let mut reached = if counts { values.tiles.iter().map(reached_nodes).sum() } else { 0 };
     let mut least = f32::INFINITY;
     let window = WINDOW_CELLS * field.mean_step;
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
@@ -301,7 +305,7 @@ pub(super) fn solve(
                 *activations += 1;
                 statistics.tiles += usize::from(*activations == 1);
                 settles &= *activations < most;
-                if outcome.changed {
+                if counts && outcome.changed {
                     reached -= reached_nodes(&values.tiles[tile as usize]);
                     reached += reached_nodes(&outcome.values);
                 }
@@ -336,9 +340,9 @@ fn reached_nodes(tile: &[f32; AREA]) -> usize {
 }
 
 /// Wakes every tile that holds a start value, and its neighbours, on all sides.
-fn wake_start(field: &TensorField, values: &Values, queue: &mut Queue) {
-    for tile in 0..field.tiling.tiles() {
-        let least = values.tiles[tile].iter().copied().fold(UNREACHED, f32::min);
+fn wake_start(field: &TensorField, seeds: &[Option<Box<Seeds>>], queue: &mut Queue) {
+    for (tile, seeds) in seeds.iter().enumerate() {
+        let least = seeds.iter().flat_map(|seeds| seeds.iter()).copied().fold(UNREACHED, f32::min);
         if least < UNREACHED {
             queue.wake(tile, least, ITSELF);
             for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
