@@ -98,9 +98,9 @@ impl<S, O: Default> Deck<S, O> {
 
     /// Does jobs until all of the round are taken.
     fn take_jobs<B>(&self, bench: &mut B, work: &impl Fn(&mut B, &S, usize, &mut O)) {
+        // Jobs are taken under the lock, so that job and round belong together.
+        let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
         loop {
-            // Taken under the lock, so that job and round belong together.
-            let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
             let index = self.next.fetch_add(1, Ordering::Relaxed);
             if index >= table.jobs {
                 return;
@@ -108,7 +108,6 @@ impl<S, O: Default> Deck<S, O> {
             let _done = OnDrop(|| {
                 self.done.fetch_add(1, Ordering::Release);
             });
-            let table = table;
             let mut outcome = table.outcomes[index].lock().unwrap_or_else(PoisonError::into_inner);
             work(bench, &table.state, index, &mut outcome);
         }
