@@ -149,13 +149,12 @@ fn lines_beside(sides: u16) -> [Lines; 2] {
 /// Sweeps of a tile before it goes back into the queue.
 const MAX_SWEEPS: usize = 16;
 
-/// Activations of a tile after which a solve is given up, without and with cones. The hardest tiles measured, of mazes and of
-/// ratio 2500, take under 40.
-const MOST_ACTIVATIONS: [u32; 2] = [5000, 200];
+/// Activations of a tile after which a solve is given up, without and with cones. Tiles of fields that settle took at
+/// most 34 at ratio 400, 86 at 2500, 19 on rough isotropic ones.
+const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 
 /// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a round but solves
-/// some too early. On a range of 1001² nodes, curvature metric: 4, 8, 16, 32 give 4.6, 4.5, 4.4, 4.5
-/// activations per tile in 1244, 875, 652, 545 rounds; isotropic 3.9, 3.7, 3.6, 3.6 in 1313, 1052, 799, 774.
+/// some too early. Between 8 and 32 it hardly mattered to the number of activations (diagonal sweeps, 1001²).
 pub(super) const WINDOW_CELLS: f32 = 16.0;
 
 /// The tiles that wait, and what is known of each.
