@@ -92,7 +92,7 @@ pub struct Statistics {
     pub tiles: usize,
     /// Times a tile was solved.
     pub activations: usize,
-    /// Sweeps over a tile, all together.
+    /// Sweeps over a tile, whole or in part, all together.
     pub sweeps: usize,
     /// Sets of tiles solved side by side.
     pub rounds: usize,
