@@ -141,7 +141,10 @@ impl Cones {
                 .filter_map(|(at, sides)| Cone::new(field, at, sides, travelled))
                 .collect::<Vec<_>>()
         };
-        let mut cones: Vec<Cone> = starts.iter().flat_map(of_start).collect();
+        let last = DVec2::new(field.cols() as f64, field.rows() as f64) - 1.0;
+        // Nothing fans out from a corner outside the grid: no way leads there.
+        let inside = |cone: &Cone| cone.at.cmpge(DVec2::ZERO).all() && cone.at.cmple(last).all();
+        let mut cones: Vec<Cone> = starts.iter().flat_map(of_start).filter(inside).collect();
         let tiling = field.tiling;
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
         if cones.is_empty() || radius < POINT_RADIUS {
