@@ -2,10 +2,10 @@
 //!
 //! [`Solver::solve`] discretises the equation by the semi-Lagrangian update on the eight triangles around a node
 //! (`update.rs`) and iterates it to a standstill tile by tile in order of distance (`tiles.rs`). First order
-//! in the spacing; a distance is the length of an actual way, so nothing is ever found to be nearer than it is
-//! beyond rounding and the variation of the metric within a cell. Walls one node thick do not leak, also
-//! diagonally. Cost: some 100 to 150 ns of one core and 16 bytes per
-//! node. [`mod@reference`] is the slow judge.
+//! in the spacing, also near the start, where the cone of a point is taken out (`cone.rs`); second order by deferred
+//! correction if asked for ([`Accuracy`], `correction/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
+//! ns of one core and 16 bytes per node, at high accuracy 140 to 210 ns and 20 bytes. [`mod@reference`] is the slow
+//! judge; `docs/solver.md` has the measurements.
 
 mod cell;
 mod cone;
@@ -49,7 +49,7 @@ pub enum Accuracy {
     /// First order in the spacing.
     #[default]
     Fast,
-    /// Second order, by deferred correction (`correction.rs`), with an estimate of the error; takes two to three times as long.
+    /// Second order, by deferred correction, with an estimate of the error at each node; takes four to five times as long.
     High,
 }
 

@@ -34,8 +34,8 @@ use super::source::Seeds;
 use super::update::ROUNDING;
 use crate::{Control, Result};
 
-/// Rounds of correction. The first leaves .3 to 7 % of the first-order error, the second gains up to a factor of 6 at
-/// ratios of 100 and more, and further ones little.
+/// Rounds of correction. In a prototype the first left .3 to 7 % of the first-order error, the second gained up to a factor
+/// of 6 at ratios of 100 and more, and further ones little.
 const ROUNDS: usize = 2;
 /// The transport of a round stands still when nothing changes by more than this many mean cells. What the first leaves
 /// undone the second sees.
