@@ -391,6 +391,15 @@ pub(crate) enum AccuracyName {
     High,
 }
 
+impl AccuracyName {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::High => "high",
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum MetricName {
     /// Length on the surface, in metres.

@@ -185,6 +185,7 @@ impl<'a> Journey<'a> {
             "barriers": metric.barrier.iter().map(|path| name(path)).collect::<Vec<_>>(),
             "cost": metric.cost.as_deref().map(name),
             "tensor": metric.tensor.as_deref().map(name),
+            "accuracy": metric.accuracy.name(),
             "start": self.start_names,
             "goal": self.goals.iter().map(|goal| &goal.name).collect::<Vec<_>>(),
         })

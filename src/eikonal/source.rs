@@ -172,18 +172,8 @@ impl StartRegion {
     /// The points that geodesics fan out from, each with the directions of the sides that end there.
     pub(super) fn corners(&self) -> impl Iterator<Item = (DVec2, [DVec2; 2])> + '_ {
         let points = self.points.iter().map(|&point| (point, [DVec2::ZERO; 2]));
-        let lines = self.lines.iter().flat_map(|line| {
-            let side = |from: usize, to: Option<usize>| {
-                to.and_then(|to| line.get(to)).map_or(DVec2::ZERO, |&to| to - line[from])
-            };
-            (0..line.len())
-                .map(move |i| (line[i], [side(i, i.checked_sub(1)), side(i, Some(i + 1))]))
-        });
-        let rings = self.areas.iter().flatten().filter(|ring| !ring.is_empty()).flat_map(|ring| {
-            let count = ring.len();
-            let side = move |from: usize, to: usize| ring[to % count] - ring[from];
-            (0..count).map(move |i| (ring[i], [side(i, i + count - 1), side(i, i + 1)]))
-        });
+        let lines = self.lines.iter().flat_map(|line| corners(line, line.first() == line.last()));
+        let rings = self.areas.iter().flatten().flat_map(|ring| corners(ring, true));
         points.chain(lines).chain(rings)
     }
 
@@ -214,6 +204,25 @@ impl StartRegion {
             .filter_map(|foot| Some((foot, travelled + straight(field, at, foot)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
+}
+
+/// The corners of a line and its ends, or of a ring, each with the directions of its two sides, zero for none. A point
+/// that is given twice in a row, as to close a ring, is one.
+fn corners(line: &[DVec2], closed: bool) -> Vec<(DVec2, [DVec2; 2])> {
+    let mut line = line.to_vec();
+    line.dedup();
+    if closed && line.len() > 1 && line.first() == line.last() {
+        line.pop();
+    }
+    let count = line.len();
+    let side = |from: usize, to: Option<usize>| {
+        to.filter(|&to| to < count).map_or(DVec2::ZERO, |to| line[to] - line[from])
+    };
+    let corner = |i: usize| match closed {
+        true => [side(i, Some((i + count - 1) % count)), side(i, Some((i + 1) % count))],
+        false => [side(i, i.checked_sub(1)), side(i, Some(i + 1))],
+    };
+    (0..count).map(|i| (line[i], corner(i))).collect()
 }
 
 fn closed_segments(ring: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {

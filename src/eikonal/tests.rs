@@ -172,6 +172,25 @@ fn lines_and_areas_are_start_regions() {
 }
 
 #[test]
+fn a_ring_given_closed_is_the_same_start() {
+    let open: Vec<DVec2> =
+        [[30.0, 30.0], [50.0, 34.0], [44.0, 52.0]].into_iter().map(DVec2::from).collect();
+    let closed: Vec<DVec2> = open.iter().chain(&open[..1]).copied().collect();
+    let solve = |lines: Vec<Vec<DVec2>>, areas: Vec<Vec<Vec<DVec2>>>| {
+        let f = field(91, 91, |_, _| Some(rotated(4.0, 0.3)));
+        let start = [StartRegion { lines, areas, ..StartRegion::default() }];
+        let map = Solver::default().solve_field(f, &start, &Stop::Never, &Control::default());
+        map.unwrap().to_row_major()
+    };
+    let area = solve(vec![], vec![vec![open]]);
+    assert_eq!(area, solve(vec![], vec![vec![closed.clone()]]));
+    // Outside, a closed line is the border of its area.
+    for (i, (line, area)) in solve(vec![closed], vec![]).into_iter().zip(area).enumerate() {
+        assert!(area == 0.0 || (line - area).abs() < 1e-4 * area, "{i}: {line} {area}");
+    }
+}
+
+#[test]
 fn a_diagonal_wall_of_single_nodes_does_not_leak() {
     for falling in [false, true] {
         let wall = |c: usize, r: usize| if falling { c + r == 40 } else { c == r };
@@ -555,9 +574,10 @@ proptest! {
         (cols, rows, tensors, starts) in wild_problem(),
         stop in any_stop(),
         at in (any_number(-1.0..40.0), any_number(-1.0..40.0)),
+        accuracy in prop_oneof![Just(Accuracy::Fast), Just(Accuracy::High)],
     ) {
         let f = field(cols, rows, |c, r| tensors[r * cols + c]);
-        let solver = Solver::default();
+        let solver = Solver { accuracy, ..Solver::default() };
         let control = Control::default();
         let Ok(map) = solver.solve_field(f, &starts, &stop, &control) else { return Ok(()) };
         for (i, g) in map.to_row_major().into_iter().enumerate() {
