@@ -11,12 +11,15 @@
 //! that is, with `g0` continued as the plane that touches it at `x`. The update itself stays the same, so the unknown is
 //! still `g`, and first order is clean. (Additive factoring: Luo and Qian, J. Comput. Phys. 230 (2011), 5.)
 
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
+
 use glam::DVec2;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::field::{SIDE, TensorField, TensorTile};
 use super::source::{POINT_RADIUS, StartRegion};
-use super::update::RING;
+use super::update::{RING, choose, greatest, lanes, least};
 use crate::Sym2;
 
 /// Radius of the region around a point where the cone is taken out, as a share of the grid's longer side: fixed in
@@ -68,31 +71,28 @@ impl Cone {
         small & Self::in_range(trace, det, SIMILAR)
     }
 
-    /// How far all ground is like that of the point, up to `most` cells.
+    /// How far all ground is like that of the point, in rows and columns, up to `most` cells.
     fn alike(&self, field: &TensorField, most: f64) -> f64 {
-        let (col, row) = (self.at.x.round() as isize, self.at.y.round() as isize);
-        let unlike = |reach: isize| {
-            let along = -reach..=reach;
-            let mut ring = along.flat_map(|k| [(k, -reach), (k, reach), (-reach, k), (reach, k)]);
-            ring.any(|(dx, dy)| !self.is_like(field, col + dx, row + dy))
-        };
-        let first = (0..=most as isize).find(|&reach| unlike(reach));
-        first.map_or(most, |reach| (reach - 1).max(0) as f64)
+        let tiling = field.tiling;
+        let gap = |tile: usize| self.gap(field, tile).max_element();
+        let mut tiles: Vec<usize> = (0..tiling.tiles()).filter(|&tile| gap(tile) <= most).collect();
+        tiles.sort_by(|&a, &b| gap(a).total_cmp(&gap(b)));
+        let mut nearest = most as f32 + 1.0;
+        for tile in tiles {
+            if gap(tile) >= f64::from(nearest) {
+                break;
+            }
+            let from = tiling.first(tile) - self.at.round();
+            let unlike = nearest_unlike(&field.tiles[tile], self.metric, from);
+            nearest = least(nearest, unlike);
+        }
+        f64::from(nearest - 1.0).max(0.0)
     }
 
-    /// Whether a node is like the point, or closed or outside.
-    fn is_like(&self, field: &TensorField, col: isize, row: isize) -> bool {
-        let (Ok(col), Ok(row)) = (usize::try_from(col), usize::try_from(row)) else { return true };
-        if col >= field.cols() || row >= field.rows() {
-            return true;
-        }
-        let (tile, i) = field.tiling.place(col, row);
-        let TensorTile { xx, xy, det } = &field.tiles[tile];
-        let (dxx, dxy, det) = (xx[i], xy[i], det[i]);
-        let m = self.metric;
-        let dyy = (det + dxy * dxy) / dxx;
-        let trace = m.xx as f32 * dxx + 2.0 * m.xy as f32 * dxy + m.yy as f32 * dyy;
-        det == 0.0 || Self::in_range(trace, det * m.det() as f32, ALIKE)
+    /// Columns and rows between the point and the nearest node of a tile; 0 inside.
+    fn gap(&self, field: &TensorField, tile: usize) -> DVec2 {
+        let half = 0.5 * (SIDE - 1) as f64;
+        ((self.at - field.tiling.first(tile) - half).abs() - half).max(DVec2::ZERO)
     }
 
     /// Whether both roots of `λ² − trace λ + det` lie between `1/most` and `most`.
@@ -228,8 +228,38 @@ fn nearest(cones: &[Cone], field: &TensorField, tile: usize) -> u32 {
     let middle = field.tiling.first(tile) + half;
     let length = |cone: &Cone| cone.travelled + cone.value(middle - cone.at);
     let nearest = cones.iter().enumerate().min_by(|a, b| length(a.1).total_cmp(&length(b.1)));
-    let gap = |cone: &Cone| ((cone.at - middle).abs() - half).max(DVec2::ZERO).length();
-    nearest.filter(|(_, cone)| gap(cone) <= cone.radius).map_or(0, |(index, _)| index as u32 + 1)
+    let reaches = |cone: &Cone| cone.gap(field, tile).length() <= cone.radius;
+    nearest.filter(|(_, cone)| reaches(cone)).map_or(0, |(index, _)| index as u32 + 1)
+}
+
+/// How far the nearest open node of a tile is from the point, in rows or columns, whose ground is not like `metric`; the first
+/// node lies at `from`.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn nearest_unlike(tile: &TensorTile, metric: Sym2, from: DVec2) -> f32 {
+    let (mxx, mxy, myy) = (metric.xx as f32, metric.xy as f32, metric.yy as f32);
+    let mdet = metric.det() as f32;
+    let mut nearest = [f32::INFINITY; SIDE];
+    for row in 0..SIDE {
+        let y = (from.y as f32 + row as f32).abs();
+        let (xx, xy) = (lanes(&tile.xx, row * SIDE), lanes(&tile.xy, row * SIDE));
+        let det = lanes(&tile.det, row * SIDE);
+        for i in 0..SIDE {
+            let yy = (det[i] + xy[i] * xy[i]) / xx[i];
+            let trace = mxx * xx[i] + 2.0 * mxy * xy[i] + myy * yy;
+            let like = (det[i] == 0.0) | Cone::in_range(trace, det[i] * mdet, ALIKE);
+            let distance = greatest((from.x as f32 + i as f32).abs(), y);
+            nearest[i] = least(nearest[i], choose(like, f32::INFINITY, distance));
+        }
+    }
+    let mut least_of_all = f32::INFINITY;
+    for distance in nearest {
+        least_of_all = least(least_of_all, distance);
+    }
+    least_of_all
 }
 
 #[cfg(test)]

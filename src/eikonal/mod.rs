@@ -7,6 +7,7 @@
 //! ns of one core and 16 bytes per node, at high accuracy 140 to 210 ns and 20 bytes. [`mod@reference`] is the slow
 //! judge; `docs/solver.md` has the measurements.
 
+mod board;
 mod cell;
 mod cone;
 mod correction;

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::board::Board;
 use super::field::{AREA, TensorField};
 use super::tiles::Values;
 use super::update::{Limits, UNREACHED};
@@ -49,9 +50,9 @@ impl Stop {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing<'a> {
     pub(super) field: &'a TensorField,
-    pub(super) values: &'a Values,
+    pub(super) board: &'a Board,
     pub(super) limits: &'a [Limits],
-    /// Number of the nodes that have a value.
+    /// At most so many nodes have a value.
     pub(super) reached: usize,
     /// Nothing below this value is news to any node; infinite when all is done.
     pub(super) news: f32,
@@ -76,11 +77,11 @@ impl Standing<'_> {
     }
 
     fn final_nodes(&self) -> usize {
-        let tiles = self.values.tiles.iter().zip(self.limits);
-        let count = |(tile, limits): (&[f32; AREA], &Limits)| {
-            tile.iter().filter(|&&value| is_final(value, limits, self.news)).count()
+        let count = |(tile, limits): (usize, &Limits)| {
+            let values = (0..AREA).map(|place| self.board.at(tile, place));
+            values.filter(|&value| is_final(value, limits, self.news)).count()
         };
-        tiles.map(count).sum()
+        self.limits.iter().enumerate().map(count).sum()
     }
 
     /// Whether the open corners of the goal's cell, and what their values come from, are final; `None` if there are none.
@@ -93,8 +94,8 @@ impl Standing<'_> {
         let open =
             |&(c, r): &(usize, usize)| c < field.cols() && r < field.rows() && field.is_open(c, r);
         let settled = |(c, r): (usize, usize)| {
-            let limits = &self.limits[field.tiling.place(c, r).0];
-            self.values.get(c, r) + limits.longest_step < self.news
+            let (tile, place) = field.tiling.place(c, r);
+            self.board.at(tile, place) + self.limits[tile].longest_step < self.news
         };
         let settled = corners.into_iter().filter(open).map(settled);
         settled.fold(None, |all, corner| Some(all.unwrap_or(true) && corner))

@@ -10,6 +10,7 @@
 
 use rayon::prelude::*;
 
+use super::board::Board;
 use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
@@ -46,6 +47,11 @@ impl Values {
         }
     }
 
+    /// How many nodes have a value.
+    fn reached(&self) -> usize {
+        self.tiles.as_flattened().iter().filter(|&&value| value < UNREACHED).count()
+    }
+
     pub(crate) fn get(&self, col: usize, row: usize) -> f32 {
         let (tile, place) = self.tiling.place(col, row);
         self.tiles[tile][place]
@@ -61,26 +67,6 @@ impl Values {
     pub(super) fn add(&mut self, corrections: &[[f32; AREA]]) {
         for (values, corrections) in self.tiles.iter_mut().zip(corrections) {
             values.iter_mut().zip(corrections).for_each(|(value, correction)| *value += correction);
-        }
-    }
-
-    /// A tile and the nodes around it; infinite outside the grid.
-    fn block(&self, tile: usize, block: &mut Block) {
-        let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
-        for (j, line) in block.iter_mut().enumerate() {
-            // Row and column of the block, counted in nodes from the tile before the first.
-            let row = ty * SIDE + SIDE + j - 1;
-            let (ny, y) = (row / SIDE, row % SIDE);
-            if ny == 0 || ny > self.tiling.down {
-                *line = [f32::INFINITY; SIDE + 2];
-                continue;
-            }
-            let base = (ny - 1) * self.tiling.across;
-            let at = |nx: usize, x: usize| self.tiles[base + nx][y * SIDE + x];
-            line[0] = if tx > 0 { at(tx - 1, SIDE - 1) } else { f32::INFINITY };
-            line[1..=SIDE].copy_from_slice(&self.tiles[base + tx][y * SIDE..][..SIDE]);
-            line[SIDE + 1] =
-                if tx + 1 < self.tiling.across { at(tx + 1, 0) } else { f32::INFINITY };
         }
     }
 }
@@ -99,27 +85,23 @@ pub struct Statistics {
 }
 
 /// What solving a tile brought.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Outcome {
-    values: [f32; AREA],
     /// For each of [`NEIGHBOURS`] the least changed value that could improve it; infinite if none.
     wakes: [f32; 8],
+    /// The least value of the tile if it does not stand still yet; infinite if it does.
+    unsettled: f32,
     limits: Limits,
-    sweeps: usize,
-    /// Whether the tile changed, and whether it stands still.
-    changed: bool,
-    settled: bool,
+    sweeps: u32,
 }
 
 impl Default for Outcome {
     fn default() -> Self {
         Self {
-            values: [f32::INFINITY; AREA],
             wakes: [f32::INFINITY; 8],
+            unsettled: f32::INFINITY,
             limits: Limits::default(),
             sweeps: 0,
-            changed: false,
-            settled: true,
         }
     }
 }
@@ -147,7 +129,7 @@ fn lines_beside(sides: u16) -> [Lines; 2] {
 }
 
 /// Sweeps of a tile before it goes back into the queue.
-const MAX_SWEEPS: usize = 16;
+const MAX_SWEEPS: u32 = 16;
 
 /// Activations of a tile after which a solve is given up, without and with cones. Tiles of fields that settle took at
 /// most 34 at ratio 400, 86 at 2500, 19 on rough isotropic ones.
@@ -204,30 +186,48 @@ impl Queue {
         self.waiting.iter().map(|&t| self.key[t as usize]).fold(f32::INFINITY, f32::min)
     }
 
-    /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first.
-    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u32>) {
+    /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first, and gives them in order of
+    /// place.
+    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<Job>) {
         taken.clear();
-        let key = &self.key;
-        let mut candidates: Vec<u32> =
-            self.waiting.iter().copied().filter(|&t| key[t as usize] <= limit).collect();
-        candidates
-            .sort_unstable_by(|&a, &b| key[a as usize].total_cmp(&key[b as usize]).then(a.cmp(&b)));
-        for tile in candidates {
-            if self.taken[tile as usize] == round {
+        // Keys are not negative, so that their bits are in order.
+        let ranked = |&tile: &u32| (self.key[tile as usize], tile);
+        let mut candidates: Vec<u64> = self
+            .waiting
+            .iter()
+            .map(ranked)
+            .filter(|&(key, _)| key <= limit)
+            .map(|(key, tile)| u64::from(key.to_bits()) << 32 | u64::from(tile))
+            .collect();
+        candidates.sort_unstable();
+        for candidate in candidates {
+            let tile = candidate as u32;
+            let i = tile as usize;
+            if self.taken[i] == round {
                 continue;
             }
-            taken.push(tile);
-            self.key[tile as usize] = f32::INFINITY;
-            self.taken[tile as usize] = round;
+            taken.push(Job { tile, sides: self.sides[i], first: self.first[i] });
+            self.key[i] = f32::INFINITY;
+            self.taken[i] = round;
             for (dx, dy) in NEIGHBOURS {
-                if let Some(n) = neighbour(tiling, tile as usize, dx, dy) {
+                if let Some(n) = neighbour(tiling, i, dx, dy) {
                     self.taken[n] = round;
                 }
             }
         }
+        taken.sort_unstable_by_key(|job| job.tile);
         let key = &self.key;
         self.waiting.retain(|&t| key[t as usize] < f32::INFINITY);
     }
+}
+
+/// A tile to be solved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Job {
+    pub(super) tile: u32,
+    /// The sides that have news, and the one with the least, see [`Queue`].
+    sides: u16,
+    first: u8,
 }
 
 pub(super) fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize> {
@@ -236,12 +236,12 @@ pub(super) fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> O
     Some(y * tiling.across + x)
 }
 
-/// What the solvers of a round read.
+/// What the solvers of a round share.
 #[derive(Debug)]
 struct Shared {
-    values: Values,
+    board: Board,
     queue: Queue,
-    taken: Vec<u32>,
+    taken: Vec<Job>,
 }
 
 /// Which of the values given to a solve are news.
@@ -273,42 +273,43 @@ pub(super) fn solve(
 ) -> Result<Option<(Values, Statistics)>> {
     let tiling = field.tiling;
     let mut queue = Queue::new(tiling.tiles());
-    match news {
-        News::All => wake_start(field, seeds, &mut queue),
-        News::Since(before) => wake_front(field, before, &values, &mut queue),
-    }
-    // Only that rule asks for it.
-    let counts = matches!(stop, Stop::Nodes(_));
-    let mut reached = if counts { values.tiles.iter().map(reached_nodes).sum() } else { 0 };
+    let board = Board::new(values);
+    let had = match news {
+        News::All => {
+            wake_start(field, seeds, &mut queue);
+            0
+        }
+        News::Since(before) => {
+            wake_front(field, before, &board, &mut queue);
+            before.reached()
+        }
+    };
     let mut least = f32::INFINITY;
     let window = WINDOW_CELLS * field.mean_step;
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
     let mut settles = true;
     let mut statistics = Statistics::default();
-    let shared = Shared { values, queue, taken: Vec::new() };
-    let work = |bench: &mut Workbench, shared: &Shared, index: usize, outcome: &mut Outcome| {
-        let tile = shared.taken[index] as usize;
+    let shared = Shared { board, queue, taken: Vec::new() };
+    let work = |bench: &mut Bench, shared: &Shared, index: usize| {
+        let job = shared.taken[index];
+        let tile = job.tile as usize;
         let first = tiling.first(tile);
         let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
-        bench.solve(&tiling, &input, shared, tile, outcome);
+        solve_tile(bench, &tiling, &input, shared, job)
     };
     let lead =
-        |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = &Outcome>| -> Result<usize> {
-            let Shared { values, queue, taken } = shared;
-            for (&tile, outcome) in taken.iter().zip(outcomes) {
-                statistics.activations += 1;
-                statistics.sweeps += outcome.sweeps;
-                let activations = &mut queue.activations[tile as usize];
+        |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| -> Result<usize> {
+            let Shared { board, queue, taken } = shared;
+            for (job, outcome) in taken.iter().zip(outcomes) {
+                let activations = &mut queue.activations[job.tile as usize];
                 *activations += 1;
-                statistics.tiles += usize::from(*activations == 1);
                 settles &= *activations < most;
-                if counts && outcome.changed {
-                    reached -= reached_nodes(&values.tiles[tile as usize]);
-                    reached += reached_nodes(&outcome.values);
-                }
-                settle(&tiling, values, queue, tile as usize, outcome);
+                statistics.activations += 1;
+                statistics.tiles += usize::from(*activations == 1);
+                statistics.sweeps += outcome.sweeps as usize;
+                settle(&tiling, queue, job.tile as usize, &outcome);
             }
             control.check()?;
             if !settles {
@@ -318,7 +319,8 @@ pub(super) fn solve(
                 control.report("solving distance", statistics.tiles as f64 / tiling.tiles() as f64);
             }
             least = queue.least_key();
-            let standing = Standing { field, values, limits: &queue.limits, reached, news: least };
+            let reached = had + statistics.tiles * AREA;
+            let standing = Standing { field, board, limits: &queue.limits, reached, news: least };
             taken.clear();
             if queue.waiting.is_empty() || standing.allows(stop) {
                 return Ok(0);
@@ -327,15 +329,12 @@ pub(super) fn solve(
             queue.take(&tiling, least + window, statistics.rounds as u32, taken);
             Ok(taken.len())
         };
-    let Shared { mut values, queue, .. } = crew::run(shared, lead, work)?;
+    let Shared { board, queue, .. } = crew::run(shared, lead, work)?;
+    let mut values = board.into_values();
     if *stop != Stop::Never {
         stop::mask(&mut values, field, &queue.limits, least, stop);
     }
     Ok(settles.then_some((values, statistics)))
-}
-
-fn reached_nodes(tile: &[f32; AREA]) -> usize {
-    tile.iter().filter(|&&value| value < UNREACHED).count()
 }
 
 /// Wakes every tile that holds a start value, and its neighbours, on all sides.
@@ -354,13 +353,13 @@ fn wake_start(field: &TensorField, seeds: &[Option<Box<Seeds>>], queue: &mut Que
 }
 
 /// Wakes every tile with a node that was unreached before, and now has a value or is beside one.
-fn wake_front(field: &TensorField, before: &Values, values: &Values, queue: &mut Queue) {
+fn wake_front(field: &TensorField, before: &Values, board: &Board, queue: &mut Queue) {
     let mut block = [[f32::INFINITY; SIDE + 2]; SIDE + 2];
     for tile in 0..field.tiling.tiles() {
         if !before.tiles[tile].contains(&UNREACHED) {
             continue;
         }
-        values.block(tile, &mut block);
+        board.load(tile, &mut block);
         let beside = |row: usize, col: usize| {
             (row - 1..=row + 1).flat_map(move |row| (col - 1..=col + 1).map(move |col| (row, col)))
         };
@@ -381,18 +380,13 @@ fn opposite(side: usize) -> usize {
     (side + 4) % 8
 }
 
-/// Writes a solved tile back and wakes the neighbours it can improve.
-fn settle(tiling: &Tiling, values: &mut Values, queue: &mut Queue, tile: usize, outcome: &Outcome) {
+/// Keeps what is now known of a tile and wakes the neighbours it can improve.
+fn settle(tiling: &Tiling, queue: &mut Queue, tile: usize, outcome: &Outcome) {
     let limits = &mut queue.limits[tile];
     limits.slack = limits.slack.max(outcome.limits.slack + outcome.limits.shift);
     limits.longest_step = limits.longest_step.max(outcome.limits.longest_step);
-    if !outcome.changed {
-        return;
-    }
-    values.tiles[tile] = outcome.values;
-    if !outcome.settled {
-        let least = outcome.values.iter().copied().fold(f32::INFINITY, f32::min);
-        queue.wake(tile, least, ITSELF);
+    if outcome.unsettled < f32::INFINITY {
+        queue.wake(tile, outcome.unsettled, ITSELF);
     }
     for (side, &key) in outcome.wakes.iter().enumerate() {
         let (dx, dy) = NEIGHBOURS[side];
@@ -404,107 +398,95 @@ fn settle(tiling: &Tiling, values: &mut Values, queue: &mut Queue, tile: usize, 
     }
 }
 
-/// Room to solve tiles in.
-#[derive(Debug)]
-struct Workbench {
-    bench: Bench,
-    block: Block,
+/// Sweeps a tile until it stands still: in the direction of the news and back, then across it and back.
+fn solve_tile(
+    bench: &mut Bench,
+    tiling: &Tiling,
+    input: &Tile<'_>,
+    shared: &Shared,
+    job: Job,
+) -> Outcome {
+    let tile = job.tile as usize;
+    shared.board.load(tile, bench.clear());
+    // Sweeps run away from the news.
+    let (dx, dy) = SIDES[job.first as usize];
+    let mut descending = [dy > 0, dx > 0];
+    let mut by_columns = dx != 0 && dy == 0;
+    // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
+    let mut owed = lines_beside(job.sides);
+    let mut changes = [0; 2];
+    let mut changed = false;
+    let mut outcome = Outcome::default();
+    while outcome.sweeps < MAX_SWEEPS && (owed, changes) != ([0; 2], [0; 2]) {
+        let side = usize::from(by_columns);
+        let dirty = owed[side] | changes[side];
+        if dirty != 0 {
+            changes = bench.sweep(input, by_columns, descending[side], dirty);
+            owed[side] = 0;
+            outcome.sweeps += 1;
+            changed |= changes != [0; 2];
+            descending[side] = !descending[side];
+        }
+        by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps.is_multiple_of(2);
+    }
+    outcome.limits = bench.limits();
+    if changed {
+        let block = bench.values();
+        let settled = (owed, changes) == ([0; 2], [0; 2]);
+        if !settled {
+            outcome.unsettled = block[1..=SIDE]
+                .iter()
+                .flat_map(|line| &line[1..=SIDE])
+                .fold(f32::INFINITY, |least, &value| least.min(value));
+        }
+        outcome.wakes = wakes(tiling, shared, tile, block);
+        shared.board.store(tile, block);
+    }
+    outcome
 }
 
-impl Default for Workbench {
-    fn default() -> Self {
-        Self { bench: Bench::default(), block: [[UNREACHED; SIDE + 2]; SIDE + 2] }
-    }
-}
-
-impl Workbench {
-    /// Sweeps a tile until it stands still: in the direction of the news and back, then across it and back.
-    fn solve(
-        &mut self,
-        tiling: &Tiling,
-        input: &Tile<'_>,
-        shared: &Shared,
-        tile: usize,
-        outcome: &mut Outcome,
-    ) {
-        shared.values.block(tile, &mut self.block);
-        self.bench.load(&self.block);
-        // Sweeps run away from the news.
-        let (dx, dy) = SIDES[shared.queue.first[tile] as usize];
-        let mut descending = [dy > 0, dx > 0];
-        let mut by_columns = dx != 0 && dy == 0;
-        // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
-        let mut owed = lines_beside(shared.queue.sides[tile]);
-        let mut changes = [0; 2];
-        outcome.sweeps = 0;
-        outcome.changed = false;
-        while outcome.sweeps < MAX_SWEEPS && (owed, changes) != ([0; 2], [0; 2]) {
-            let side = usize::from(by_columns);
-            let dirty = owed[side] | changes[side];
-            if dirty != 0 {
-                changes = self.bench.sweep(input, by_columns, descending[side], dirty);
-                owed[side] = 0;
-                outcome.sweeps += 1;
-                outcome.changed |= changes != [0; 2];
-                descending[side] = !descending[side];
-            }
-            by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps.is_multiple_of(2);
+/// The least changed values that could improve a neighbour. A node `x` can be improved by a neighbour `y` only if
+/// `g(y) < g(x) + slack`.
+fn wakes(tiling: &Tiling, shared: &Shared, tile: usize, block: &Block) -> [f32; 8] {
+    const LAST: usize = SIDE - 1;
+    // News at the borders, with one place before and after.
+    let news = |col: usize, row: usize| {
+        let (old, new) = (shared.board.at(tile, row * SIDE + col), block[row + 1][col + 1]);
+        if old - new > ROUNDING * new { new } else { f32::INFINITY }
+    };
+    let slack = |(dx, dy): (isize, isize)| {
+        neighbour(tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
+    };
+    let improves = |new: f32, old: f32, slack: f32| {
+        if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }
+    };
+    let side = |k: usize, line: [(usize, usize); SIDE], ring: [(usize, usize); SIDE]| {
+        let slack = slack(NEIGHBOURS[k]);
+        let mut padded = [f32::INFINITY; SIDE + 2];
+        for (news_at, &(col, row)) in padded[1..].iter_mut().zip(&line) {
+            *news_at = news(col, row);
         }
-        outcome.settled = (owed, changes) == ([0; 2], [0; 2]);
-        outcome.limits = self.bench.store(&mut self.block);
-        if outcome.changed {
-            for (row, line) in outcome.values.chunks_exact_mut(SIDE).enumerate() {
-                line.copy_from_slice(&self.block[row + 1][1..=SIDE]);
-            }
-            self.wakes(tiling, shared, tile, &mut outcome.wakes);
+        let mut key = f32::INFINITY;
+        for i in 0..SIDE {
+            let new = padded[i].min(padded[i + 1]).min(padded[i + 2]);
+            let (col, row) = ring[i];
+            key = key.min(improves(new, block[row][col], slack));
         }
-    }
-
-    /// The least changed values that could improve a neighbour. A node `x` can be improved by a neighbour `y` only if
-    /// `g(y) < g(x) + slack`.
-    fn wakes(&self, tiling: &Tiling, shared: &Shared, tile: usize, wakes: &mut [f32; 8]) {
-        const LAST: usize = SIDE - 1;
-        let before = &shared.values.tiles[tile];
-        // News at the borders, with one place before and after.
-        let news = |col: usize, row: usize| {
-            let (old, new) = (before[row * SIDE + col], self.block[row + 1][col + 1]);
-            if old - new > ROUNDING * new { new } else { f32::INFINITY }
-        };
-        let slack = |(dx, dy): (isize, isize)| {
-            neighbour(tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
-        };
-        let improves = |new: f32, old: f32, slack: f32| {
-            if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }
-        };
-        let side = |k: usize, line: [(usize, usize); SIDE], ring: [(usize, usize); SIDE]| {
-            let slack = slack(NEIGHBOURS[k]);
-            let mut padded = [f32::INFINITY; SIDE + 2];
-            for (news_at, &(col, row)) in padded[1..].iter_mut().zip(&line) {
-                *news_at = news(col, row);
-            }
-            let mut key = f32::INFINITY;
-            for i in 0..SIDE {
-                let new = padded[i].min(padded[i + 1]).min(padded[i + 2]);
-                let (col, row) = ring[i];
-                key = key.min(improves(new, self.block[row][col], slack));
-            }
-            key
-        };
-        let corner = |k: usize, col: usize, row: usize| {
-            let (dx, dy) = NEIGHBOURS[k];
-            let old =
-                self.block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
-            improves(news(col, row), old, slack(NEIGHBOURS[k]))
-        };
-        *wakes = [
-            side(0, std::array::from_fn(|i| (LAST, i)), std::array::from_fn(|i| (SIDE + 1, i + 1))),
-            corner(1, LAST, LAST),
-            side(2, std::array::from_fn(|i| (i, LAST)), std::array::from_fn(|i| (i + 1, SIDE + 1))),
-            corner(3, 0, LAST),
-            side(4, std::array::from_fn(|i| (0, i)), std::array::from_fn(|i| (0, i + 1))),
-            corner(5, 0, 0),
-            side(6, std::array::from_fn(|i| (i, 0)), std::array::from_fn(|i| (i + 1, 0))),
-            corner(7, LAST, 0),
-        ];
-    }
+        key
+    };
+    let corner = |k: usize, col: usize, row: usize| {
+        let (dx, dy) = NEIGHBOURS[k];
+        let old = block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
+        improves(news(col, row), old, slack(NEIGHBOURS[k]))
+    };
+    [
+        side(0, std::array::from_fn(|i| (LAST, i)), std::array::from_fn(|i| (SIDE + 1, i + 1))),
+        corner(1, LAST, LAST),
+        side(2, std::array::from_fn(|i| (i, LAST)), std::array::from_fn(|i| (i + 1, SIDE + 1))),
+        corner(3, 0, LAST),
+        side(4, std::array::from_fn(|i| (0, i)), std::array::from_fn(|i| (0, i + 1))),
+        corner(5, 0, 0),
+        side(6, std::array::from_fn(|i| (i, 0)), std::array::from_fn(|i| (i + 1, 0))),
+        corner(7, LAST, 0),
+    ]
 }

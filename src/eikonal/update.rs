@@ -184,18 +184,21 @@ pub(crate) struct Limits {
 }
 
 impl Bench {
-    /// Puts a tile on the bench.
-    pub(crate) fn load(&mut self, block: &Block) {
-        self.values = *block;
+    /// Room for the values of the next tile.
+    pub(crate) fn clear(&mut self) -> &mut Block {
         self.by_columns = false;
         self.prepared.iter_mut().for_each(|side| side.ready = 0);
         self.limits = Limits::default();
+        &mut self.values
     }
 
-    /// Takes the values back off the bench.
-    pub(crate) fn store(&mut self, block: &mut Block) -> Limits {
+    /// The values as they are now.
+    pub(crate) fn values(&mut self) -> &Block {
         self.turn(false);
-        *block = self.values;
+        &self.values
+    }
+
+    pub(crate) fn limits(&self) -> Limits {
         self.limits
     }
 

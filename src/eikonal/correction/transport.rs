@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::super::crew;
 use super::super::field::{AREA, SIDE, TensorField, Tiling};
-use super::super::tiles::{ITSELF, NEIGHBOURS, Queue, WINDOW_CELLS, neighbour};
+use super::super::tiles::{ITSELF, Job, NEIGHBOURS, Queue, WINDOW_CELLS, neighbour};
 use super::super::update::{ALL, Lines, RING, UNREACHED, around, choose, lanes};
 use super::feet::{Feet, TRIANGLES};
 use super::patch::{Lanes, MARGIN, Patch, patch, seen, transpose};
@@ -21,7 +21,7 @@ const MOST_ACTIVATIONS: u32 = 40;
 struct Shared {
     e: Vec<[f32; AREA]>,
     queue: Queue,
-    taken: Vec<u32>,
+    taken: Vec<Job>,
 }
 
 #[derive(Default)]
@@ -50,15 +50,15 @@ pub(super) fn carry(
     let mut round = 0;
     let shared =
         Shared { e: vec![[0.0; AREA]; tiles], queue: Queue::new(tiles), taken: Vec::new() };
-    let work = |_: &mut (), shared: &Shared, index: usize, outcome: &mut Outcome| {
-        let tile = shared.taken[index] as usize;
-        carry_tile(&tiling, &feet[tile], &shared.e, tile, tolerance, outcome);
+    let work = |_: &mut (), shared: &Shared, index: usize| {
+        let tile = shared.taken[index].tile as usize;
+        carry_tile(&tiling, &feet[tile], &shared.e, tile, tolerance)
     };
-    let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = &Outcome>| {
+    let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| {
         control.check()?;
         let Shared { e, queue, taken } = shared;
-        for (&tile, outcome) in taken.iter().zip(outcomes) {
-            let tile = tile as usize;
+        for (job, outcome) in taken.iter().zip(outcomes) {
+            let tile = job.tile as usize;
             activations[tile] += 1;
             if let Some(new) = &outcome.e {
                 e[tile] = **new;
@@ -103,8 +103,8 @@ fn carry_tile(
     e: &[[f32; AREA]],
     tile: usize,
     tolerance: f32,
-    outcome: &mut Outcome,
-) {
+) -> Outcome {
+    let mut outcome = Outcome::default();
     let mut block = patch(tiling, tile, 0.0, |t| &e[t]);
     // By columns where most comes along the rows, and against the direction it comes from.
     let turned = (feet.flow[0].abs() > feet.flow[1].abs()).then(|| feet.transposed());
@@ -116,7 +116,6 @@ fn carry_tile(
     let mut descending = feet.flow[1] > 0;
     let mut sweeps = 0;
     let mut dirty = ALL;
-    outcome.changed = false;
     while dirty != 0 && sweeps < MOST_SWEEPS {
         dirty = carry_once(&mut block, &weights, &feet.rho, tolerance, descending, dirty);
         outcome.changed |= dirty != 0;
@@ -127,10 +126,12 @@ fn carry_tile(
     if turned.is_some() {
         transpose(&mut block);
     }
-    let new = outcome.e.get_or_insert_with(|| Box::new([0.0; AREA]));
+    let mut new = Box::new([0.0; AREA]);
     for (row, line) in new.chunks_exact_mut(SIDE).enumerate() {
         line.copy_from_slice(&block[row + MARGIN][MARGIN..MARGIN + SIDE]);
     }
+    outcome.e = Some(new);
+    outcome
 }
 
 /// Weights of the ring in each node's value, by rows.

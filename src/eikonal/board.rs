@@ -1,0 +1,74 @@
+//! The values while they are being solved, shared by all threads.
+
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+use super::field::{AREA, SIDE, Tiling};
+use super::tiles::Values;
+use super::update::Block;
+
+/// Values at the nodes as the bits of `f32`, tile by tile.
+///
+/// The threads of a round write tiles that do not touch, so that nobody reads what another writes, and nothing is
+/// copied from thread to thread: a tile stays in the cache of the one that solved it last. The accesses are atomic only to
+/// tell the compiler that this is safe; relaxed ones cost what plain ones do. The end of a round orders them.
+#[derive(Debug)]
+pub(super) struct Board {
+    tiling: Tiling,
+    nodes: Vec<AtomicU32>,
+}
+
+impl Board {
+    pub(super) fn new(values: Values) -> Self {
+        let nodes = values.tiles.into_flattened();
+        Self {
+            tiling: values.tiling,
+            nodes: nodes.into_iter().map(|value| AtomicU32::new(value.to_bits())).collect(),
+        }
+    }
+
+    pub(super) fn into_values(self) -> Values {
+        let nodes: Vec<f32> =
+            self.nodes.into_iter().map(|bits| f32::from_bits(bits.into_inner())).collect();
+        Values { tiling: self.tiling, tiles: bytemuck::allocation::cast_vec(nodes) }
+    }
+
+    fn tile(&self, tile: usize) -> &[AtomicU32] {
+        &self.nodes[tile * AREA..][..AREA]
+    }
+
+    pub(super) fn at(&self, tile: usize, place: usize) -> f32 {
+        f32::from_bits(self.tile(tile)[place].load(Relaxed))
+    }
+
+    /// A tile and the nodes around it; infinite outside the grid.
+    pub(super) fn load(&self, tile: usize, block: &mut Block) {
+        let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
+        for (j, line) in block.iter_mut().enumerate() {
+            // Row and column of the block, counted in nodes from the tile before the first.
+            let row = ty * SIDE + SIDE + j - 1;
+            let (ny, y) = (row / SIDE, row % SIDE);
+            if ny == 0 || ny > self.tiling.down {
+                *line = [f32::INFINITY; SIDE + 2];
+                continue;
+            }
+            let base = (ny - 1) * self.tiling.across;
+            let at = |nx: usize, x: usize| self.at(base + nx, y * SIDE + x);
+            line[0] = if tx > 0 { at(tx - 1, SIDE - 1) } else { f32::INFINITY };
+            let middle = &self.tile(base + tx)[y * SIDE..][..SIDE];
+            for (value, bits) in line[1..=SIDE].iter_mut().zip(middle) {
+                *value = f32::from_bits(bits.load(Relaxed));
+            }
+            line[SIDE + 1] =
+                if tx + 1 < self.tiling.across { at(tx + 1, 0) } else { f32::INFINITY };
+        }
+    }
+
+    /// Puts a solved tile back.
+    pub(super) fn store(&self, tile: usize, block: &Block) {
+        for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..]) {
+            for (bits, value) in line.iter().zip(&solved[1..=SIDE]) {
+                bits.store(value.to_bits(), Relaxed);
+            }
+        }
+    }
+}
