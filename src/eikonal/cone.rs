@@ -37,7 +37,7 @@ const SIMILAR: f32 = 4.0;
 const MOST_SHIFT: f32 = 0.5;
 
 /// A point that geodesics fan out from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cone {
     pub(crate) at: DVec2,
     /// Stored metric at the point.
@@ -125,7 +125,7 @@ impl Cone {
 }
 
 /// The cones of the start regions, and which of them each tile lies in.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Cones {
     cones: Vec<Cone>,
     /// Index of the tile's cone plus one; 0 if it lies in none. Empty if there are no cones.

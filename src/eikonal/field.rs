@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::metric::SpeedBlock;
 use crate::surface::BLOCK;
-use crate::{Control, MetricField, Result, Sym2};
+use crate::{Control, Error, MetricField, Result, Sym2};
 
 /// Side of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
 /// needs more activations, the longer more sweeps; design measurements at ratio 1 to 400).
@@ -150,6 +150,26 @@ impl TensorField {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.tiling.rows
+    }
+
+    /// Gives a node another tensor in index coordinates, or closes it (`None`). A tensor whose entries
+    /// are more than 10¹⁵ times larger or smaller than is typical of the field closes it too.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the node is not on the grid.
+    pub fn set(&mut self, col: usize, row: usize, tensor: Option<Sym2>) -> Result<()> {
+        if col >= self.cols() || row >= self.rows() {
+            return Err(Error::usage(format!("the node ({col}, {row}) is not on the grid")));
+        }
+        let d = tensor.unwrap_or_default() * self.root_scale.powi(-2);
+        let fits = fits(d.xx) & fits(d.yy) & fits(d.det());
+        let stored = |value: f64| if fits { value as f32 } else { 0.0 };
+        let (tile, place) = self.tiling.place(col, row);
+        let tile = &mut self.tiles[tile];
+        tile.xx[place] = stored(d.xx);
+        tile.xy[place] = stored(d.xy);
+        tile.det[place] = stored(d.det());
+        Ok(())
     }
 
     /// Whether the node may be entered.

@@ -12,6 +12,7 @@ mod cell;
 mod cone;
 mod correction;
 mod crew;
+mod edit;
 mod field;
 mod labels;
 pub mod reference;
@@ -30,8 +31,8 @@ pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
 pub use self::stop::Stop;
 pub use self::tiles::Statistics;
-use self::tiles::{Equation, News, Values};
-use self::update::{RING, UNREACHED, segment};
+use self::tiles::{Equation, News, Solution, Values};
+use self::update::{Limits, RING, UNREACHED, segment};
 use crate::{Control, Error, GridFrame, MetricField, Result};
 
 /// Solves the eikonal equation.
@@ -98,14 +99,15 @@ impl Solver {
             let equation =
                 Equation { field: &field, cones, seeds: &seeds, tolerance: self.tolerance };
             let values = Values::seeded(&field, &seeds);
-            tiles::solve(&equation, values, News::All, stop, control)
+            let limits = vec![Limits::default(); field.tiling.tiles()];
+            tiles::solve(&equation, values, limits, News::All, stop, control)
         };
         let mut solution = solve(&cones)?;
         if solution.is_none() && !cones.is_empty() {
             cones = Cones::default();
             solution = solve(&cones)?;
         }
-        let (mut values, statistics) = solution.ok_or_else(|| {
+        let Solution { mut values, limits, statistics } = solution.ok_or_else(|| {
             Error::usage("the distance does not settle on this metric; its tensors are too extreme")
         })?;
         let errors = self.correct(&field, &cones, &mut values, &seeds, control)?;
@@ -115,6 +117,7 @@ impl Solver {
             field,
             cones,
             values,
+            limits,
             starts: starts.into(),
             statistics,
             unit: "",
@@ -146,22 +149,37 @@ impl Solver {
     /// As [`solve`](Self::solve).
     pub fn resume(&self, map: DistanceMap, stop: &Stop, control: &Control) -> Result<DistanceMap> {
         stop.check()?;
-        let DistanceMap { field, cones, starts, values: before, .. } = &map;
-        let seeds = source::seeds(field, starts)?;
+        let seeds = source::seeds(&map.field, &map.starts)?;
+        self.go_on(map, &[], &seeds, stop, control)
+    }
+
+    /// Solves from the nodes that are unreached in `map` and around the `edited` ones, see [`News::Since`].
+    fn go_on(
+        &self,
+        map: DistanceMap,
+        edited: &[f32],
+        seeds: &[Option<Box<Seeds>>],
+        stop: &Stop,
+        control: &Control,
+    ) -> Result<DistanceMap> {
+        let DistanceMap { field, cones, values: before, limits, .. } = &map;
         let mut values = before.clone();
-        values.seed(&seeds);
-        let equation = Equation { field, cones, seeds: &seeds, tolerance: self.tolerance };
-        let solution = tiles::solve(&equation, values, News::Since(before), stop, control)?;
-        match solution {
-            Some((mut values, statistics)) => {
-                let errors = self.correct(field, cones, &mut values, &seeds, control)?;
-                Ok(DistanceMap { values, errors, statistics, ..map })
+        values.seed(seeds);
+        let equation = Equation { field, cones, seeds, tolerance: self.tolerance };
+        let news = News::Since { before, edited };
+        match tiles::solve(&equation, values, limits.clone(), news, stop, control)? {
+            Some(Solution { mut values, limits, statistics }) => {
+                let errors = self.correct(field, cones, &mut values, seeds, control)?;
+                Ok(DistanceMap { values, limits, errors, statistics, ..map })
             }
-            None => {
-                let again = self.solve_field(map.field, &map.starts, stop, control)?;
-                Ok(DistanceMap { unit: map.unit, frame: map.frame, ..again })
-            }
+            None => self.solve_again(map, stop, control),
         }
+    }
+
+    /// Solves for the field and the starts of a map from the beginning.
+    fn solve_again(&self, map: DistanceMap, stop: &Stop, control: &Control) -> Result<DistanceMap> {
+        let again = self.solve_field(map.field, &map.starts, stop, control)?;
+        Ok(DistanceMap { unit: map.unit, frame: map.frame, ..again })
     }
 }
 
@@ -171,6 +189,8 @@ pub struct DistanceMap {
     pub(crate) field: TensorField,
     cones: Cones,
     values: Values,
+    /// What is known of each tile, for going on.
+    limits: Vec<Limits>,
     /// Estimates of the error, in high accuracy.
     errors: Option<Vec<[f32; AREA]>>,
     starts: Box<[StartRegion]>,

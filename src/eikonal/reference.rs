@@ -6,7 +6,7 @@ use super::cone::Cones;
 use super::field::TensorField;
 use super::source::StartRegion;
 use super::tiles::Values;
-use super::update::{RING, ceiling};
+use super::update::{Limits, RING, ceiling};
 use super::{DistanceMap, Statistics, best_foot, source};
 use crate::{Control, Error, Result};
 
@@ -49,10 +49,14 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
         }
     }
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
+    // Of no tile it is known what could not improve it.
+    let unknown = Limits { slack: f32::MAX, shift: 0.0, longest_step: f32::MAX };
+    let limits = vec![unknown; field.tiling.tiles()];
     Ok(DistanceMap {
         field,
         cones,
         values,
+        limits,
         errors: None,
         starts: starts.into(),
         statistics,

@@ -7,6 +7,8 @@ use proptest::prelude::*;
 use super::*;
 use crate::Sym2;
 
+mod edit;
+
 const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
 
 fn rotated(ratio: f64, angle: f64) -> Sym2 {

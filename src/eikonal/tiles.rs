@@ -16,7 +16,7 @@ use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling};
 use super::source::Seeds;
 use super::stop::{self, Standing, Stop};
-use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Tile, UNREACHED};
+use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Rule, Tile, UNREACHED};
 use crate::{Control, Result};
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
@@ -249,8 +249,21 @@ struct Shared {
 pub(super) enum News<'a> {
     /// All of them: they are those of the start.
     All,
-    /// Those of and beside the nodes that are unreached here; the others are final.
-    Since(&'a Values),
+    /// Those of and beside the nodes that are unreached in `before`, and around the `edited` nodes; the others are final,
+    /// or will be lowered by these.
+    Since { before: &'a Values, edited: &'a [f32] },
+    /// That nodes were edited and lost their values: for each tile the least of these, infinite if none. What came from
+    /// them is to be forgotten as well, see [`Rule::Forget`].
+    Lost(&'a [f32]),
+}
+
+/// What a solve comes to.
+#[derive(Debug)]
+pub(super) struct Solution {
+    pub(super) values: Values,
+    /// What is known of each tile: what can improve it.
+    pub(super) limits: Vec<Limits>,
+    pub(super) statistics: Statistics,
 }
 
 /// What is to be solved, and to which share of a step.
@@ -263,27 +276,34 @@ pub(super) struct Equation<'a> {
 }
 
 /// Relaxes `values` to the solution of the discrete equation, starting from those that are `news`, until `stop` allows to
-/// end. What is not final then is unreached. `None` if the values do not settle.
+/// end. What is not final then is unreached. `limits` are those of the solution that the values are from. `None` if the
+/// values do not settle.
 pub(super) fn solve(
     &Equation { field, cones, seeds, tolerance }: &Equation<'_>,
     values: Values,
+    limits: Vec<Limits>,
     news: News<'_>,
     stop: &Stop,
     control: &Control,
-) -> Result<Option<(Values, Statistics)>> {
+) -> Result<Option<Solution>> {
     let tiling = field.tiling;
-    let mut queue = Queue::new(tiling.tiles());
+    let mut queue = Queue { limits, ..Queue::new(tiling.tiles()) };
     let board = Board::new(values);
     let had = match news {
         News::All => {
             wake_start(field, seeds, &mut queue);
             0
         }
-        News::Since(before) => {
-            wake_front(field, before, &board, &mut queue);
+        News::Since { before, edited } => {
+            wake_front(&tiling, before, &board, edited, &mut queue);
             before.reached()
         }
+        News::Lost(keys) => {
+            wake_around(&tiling, keys.iter().copied(), &mut queue);
+            0
+        }
     };
+    let rule = if matches!(news, News::Lost(_)) { Rule::Forget } else { Rule::Lower };
     let mut least = f32::INFINITY;
     let window = WINDOW_CELLS * field.mean_step;
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
@@ -297,7 +317,7 @@ pub(super) fn solve(
         let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
-        solve_tile(bench, &tiling, &input, shared, job)
+        solve_tile(bench, &tiling, &input, rule, shared, job)
     };
     let lead =
         |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| -> Result<usize> {
@@ -334,41 +354,50 @@ pub(super) fn solve(
     if *stop != Stop::Never {
         stop::mask(&mut values, field, &queue.limits, least, stop);
     }
-    Ok(settles.then_some((values, statistics)))
+    Ok(settles.then_some(Solution { values, limits: queue.limits, statistics }))
 }
 
 /// Wakes every tile that holds a start value, and its neighbours, on all sides.
 fn wake_start(field: &TensorField, seeds: &[Option<Box<Seeds>>], queue: &mut Queue) {
-    for (tile, seeds) in seeds.iter().enumerate() {
-        let least = seeds.iter().flat_map(|seeds| seeds.iter()).copied().fold(UNREACHED, f32::min);
-        if least < UNREACHED {
-            queue.wake(tile, least, ITSELF);
-            for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
-                if let Some(n) = neighbour(&field.tiling, tile, dx, dy) {
-                    queue.wake(n, least, opposite(side));
-                }
+    let least = |seeds: &Option<Box<Seeds>>| {
+        seeds.iter().flat_map(|seeds| seeds.iter()).copied().fold(f32::INFINITY, f32::min)
+    };
+    wake_around(&field.tiling, seeds.iter().map(least), queue);
+}
+
+/// Wakes every tile whose key is finite, and its neighbours on the sides to it.
+fn wake_around(tiling: &Tiling, keys: impl Iterator<Item = f32>, queue: &mut Queue) {
+    for (tile, key) in keys.enumerate().filter(|&(_, key)| key < f32::INFINITY) {
+        queue.wake(tile, key, ITSELF);
+        for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
+            if let Some(n) = neighbour(tiling, tile, dx, dy) {
+                queue.wake(n, key, opposite(side));
             }
         }
     }
 }
 
-/// Wakes every tile with a node that was unreached before, and now has a value or is beside one.
-fn wake_front(field: &TensorField, before: &Values, board: &Board, queue: &mut Queue) {
+/// Wakes every tile with a node that was unreached before, and now has a value or is beside one. Also those around the
+/// `edited` nodes: a node that was opened opens a diagonal step between others, which need not change themselves.
+fn wake_front(tiling: &Tiling, before: &Values, board: &Board, edited: &[f32], queue: &mut Queue) {
+    let is_edited = |tile: usize| edited.get(tile).is_some_and(|&key| key < f32::INFINITY);
     let mut block = [[f32::INFINITY; SIDE + 2]; SIDE + 2];
-    for tile in 0..field.tiling.tiles() {
-        if !before.tiles[tile].contains(&UNREACHED) {
+    for (tile, before) in before.tiles.iter().enumerate() {
+        let around = |(dx, dy)| neighbour(tiling, tile, dx, dy).is_some_and(is_edited);
+        let all = SIDES.into_iter().any(around);
+        if !all && !before.contains(&UNREACHED) {
             continue;
         }
         board.load(tile, &mut block);
-        let beside = |row: usize, col: usize| {
-            (row - 1..=row + 1).flat_map(move |row| (col - 1..=col + 1).map(move |col| (row, col)))
-        };
-        let nodes = (1..=SIDE).flat_map(|row| (1..=SIDE).map(move |col| (row, col)));
-        let key = nodes
-            .filter(|&(row, col)| before.tiles[tile][(row - 1) * SIDE + col - 1] == UNREACHED)
-            .flat_map(|(row, col)| beside(row, col))
-            .map(|(row, col)| block[row][col])
-            .fold(UNREACHED, f32::min);
+        let mut key = UNREACHED;
+        for (rows, before) in block.windows(3).zip(before.chunks_exact(SIDE)) {
+            let across: [f32; SIDE + 2] =
+                std::array::from_fn(|i| rows[0][i].min(rows[1][i]).min(rows[2][i]));
+            for (beside, &before) in across.windows(3).zip(before) {
+                let least = beside[0].min(beside[1]).min(beside[2]);
+                key = key.min(if all || before == UNREACHED { least } else { UNREACHED });
+            }
+        }
         if key < UNREACHED {
             queue.wake(tile, key, ITSELF);
         }
@@ -403,6 +432,7 @@ fn solve_tile(
     bench: &mut Bench,
     tiling: &Tiling,
     input: &Tile<'_>,
+    rule: Rule,
     shared: &Shared,
     job: Job,
 ) -> Outcome {
@@ -421,7 +451,7 @@ fn solve_tile(
         let side = usize::from(by_columns);
         let dirty = owed[side] | changes[side];
         if dirty != 0 {
-            changes = bench.sweep(input, by_columns, descending[side], dirty);
+            changes = bench.sweep(input, rule, by_columns, descending[side], dirty);
             owed[side] = 0;
             outcome.sweeps += 1;
             changed |= changes != [0; 2];
@@ -445,14 +475,14 @@ fn solve_tile(
     outcome
 }
 
-/// The least changed values that could improve a neighbour. A node `x` can be improved by a neighbour `y` only if
-/// `g(y) < g(x) + slack`.
+/// The least changed values that could improve, or supported, a neighbour. A node `x` can be improved by a neighbour `y`
+/// only if `g(y) < g(x) + slack`.
 fn wakes(tiling: &Tiling, shared: &Shared, tile: usize, block: &Block) -> [f32; 8] {
     const LAST: usize = SIDE - 1;
     // News at the borders, with one place before and after.
     let news = |col: usize, row: usize| {
         let (old, new) = (shared.board.at(tile, row * SIDE + col), block[row + 1][col + 1]);
-        if old - new > ROUNDING * new { new } else { f32::INFINITY }
+        if (old - new).abs() > ROUNDING * new { old.min(new) } else { f32::INFINITY }
     };
     let slack = |(dx, dy): (isize, isize)| {
         neighbour(tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)

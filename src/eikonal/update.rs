@@ -215,7 +215,7 @@ impl Bench {
         }
     }
 
-    /// One Gauss–Seidel sweep over the rows (or columns) in `dirty`, from the first to the last or the other way
+    /// One Gauss–Seidel sweep by `rule` over the rows (or columns) in `dirty`, from the first to the last or the other way
     /// (`descending`), taking in those that become dirty ahead of it. A change below `tolerance` of a node's shortest step does
     /// not count.
     ///
@@ -223,6 +223,7 @@ impl Bench {
     pub(crate) fn sweep(
         &mut self,
         tile: &Tile<'_>,
+        rule: Rule,
         by_columns: bool,
         descending: bool,
         dirty: Lines,
@@ -231,13 +232,27 @@ impl Bench {
         let prepared = &mut self.prepared[usize::from(by_columns)];
         let how = How { by_columns, descending };
         let mut changed = [0; SIDE];
-        let sweep = if tile.cone.is_some() { sweep_in_cone } else { sweep };
+        let sweep = match (rule, tile.cone.is_some()) {
+            (Rule::Lower, false) => sweep,
+            (Rule::Lower, true) => sweep_in_cone,
+            (Rule::Forget, false) => forget,
+            (Rule::Forget, true) => forget_in_cone,
+        };
         let along =
             sweep(&mut self.values, prepared, tile, how, dirty, &mut changed, &mut self.limits);
         let across =
             (0..SIDE).fold(0, |set, i| if changed[i] == 0 { set } else { set | around(i) });
         if by_columns { [across, along] } else { [along, across] }
     }
+}
+
+/// What a sweep does to a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rule {
+    /// Lowers it to its best value over the ring.
+    Lower,
+    /// Makes it unreached if its ring no longer supports its value: if the best value over the ring is higher.
+    Forget,
 }
 
 /// What a sweep reads.
@@ -467,7 +482,7 @@ fn sweep(
     changed: &mut [u32; SIDE],
     limits: &mut Limits,
 ) -> Lines {
-    sweep_lines::<false>(values, prepared, tile, how, dirty, changed, limits)
+    sweep_lines::<false, false>(values, prepared, tile, how, dirty, changed, limits)
 }
 
 /// The same in a tile that lies in a [`Cone`].
@@ -485,11 +500,47 @@ fn sweep_in_cone(
     changed: &mut [u32; SIDE],
     limits: &mut Limits,
 ) -> Lines {
-    sweep_lines::<true>(values, prepared, tile, how, dirty, changed, limits)
+    sweep_lines::<true, false>(values, prepared, tile, how, dirty, changed, limits)
+}
+
+/// [`Rule::Forget`].
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn forget(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    sweep_lines::<false, true>(values, prepared, tile, how, dirty, changed, limits)
+}
+
+/// The same in a tile that lies in a [`Cone`].
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn forget_in_cone(
+    values: &mut Block,
+    prepared: &mut Prepared,
+    tile: &Tile<'_>,
+    how: How,
+    dirty: Lines,
+    changed: &mut [u32; SIDE],
+    limits: &mut Limits,
+) -> Lines {
+    sweep_lines::<true, true>(values, prepared, tile, how, dirty, changed, limits)
 }
 
 #[inline(always)]
-fn sweep_lines<const IN_CONE: bool>(
+fn sweep_lines<const IN_CONE: bool, const FORGET: bool>(
     values: &mut Block,
     prepared: &mut Prepared,
     tile: &Tile<'_>,
@@ -555,12 +606,23 @@ fn sweep_lines<const IN_CONE: bool>(
                 ),
             );
             let u = least(least(rising, falling), edges);
-            let floor = ROUNDING * u;
-            let significant = greatest(k.tolerance[i], floor);
-            let news = u32::from((old[i] - u > significant) & (u < k.ceiling[i]));
-            changed[i] |= news;
-            any |= news;
-            new[i] = choose(u < least(old[i], k.ceiling[i]), u, old[i]);
+            let news;
+            if FORGET {
+                let margin = ROUNDING * old[i];
+                // No step is shorter than √(min(1/xx, 1/yy)/2). A margin that is not far below lets nodes support each other.
+                let supports =
+                    (u <= old[i] + margin) & (margin * margin < 0.125 * least(k.ix[i], k.iy[i]));
+                // Values of the start hold by themselves.
+                news = !supports & (old[i] < least(k.ceiling[i], UNREACHED));
+                new[i] = choose(news, UNREACHED, old[i]);
+            } else {
+                let floor = ROUNDING * u;
+                let significant = greatest(k.tolerance[i], floor);
+                news = (old[i] - u > significant) & (u < k.ceiling[i]);
+                new[i] = choose(u < least(old[i], k.ceiling[i]), u, old[i]);
+            }
+            changed[i] |= u32::from(news);
+            any |= u32::from(news);
         }
         values[row + 1][1..=SIDE].copy_from_slice(&new);
         if any != 0 {

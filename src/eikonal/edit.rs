@@ -1,0 +1,162 @@
+//! Solving again after an edit of the field, only as far as the edit is felt.
+//!
+//! A node's value is still true if it is *supported*: if the update from its ring gives no more. So the nodes that
+//! changed are forgotten, then all that are no longer supported, in the order in which news travel, until none is left
+//! ([`Rule::Forget`](super::update::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
+//! step than anything its ring offers. What is left is true or too high, so that the ordinary solve, going on from
+//! the nodes that were forgotten, ends where one from the beginning would.
+
+use rayon::prelude::*;
+
+use super::field::{AREA, TensorTile};
+use super::source::{self, Seeds};
+use super::tiles::{self, Equation, News, Solution, Statistics};
+use super::update::UNREACHED;
+use super::{Cones, DistanceMap, Solver, Stop, TensorField};
+use crate::{Control, MetricField, Result, Sym2};
+
+impl Solver {
+    /// The distances from the starts of `map` under another metric, of which only what the difference can have moved is solved again.
+    /// The outcome is that of a solve from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was done.
+    ///
+    /// Costs the sampling of the metric and a comparison of all tensors; [`update_nodes`](Self::update_nodes) costs
+    /// neither. All is solved again if `map` is of [`Accuracy::High`](super::Accuracy), whose values say nothing of what they came from, or
+    /// where the ground around a start changed so that another cone fans out from it.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn update(
+        &self,
+        map: DistanceMap,
+        metric: &MetricField<'_>,
+        stop: &Stop,
+        control: &Control,
+    ) -> Result<DistanceMap> {
+        let field = TensorField::sample(metric, control)?;
+        let map = self.update_field(map, field, stop, control)?;
+        let frame = Some(metric.surface().frame().clone());
+        Ok(DistanceMap { unit: metric.unit(), frame, ..map })
+    }
+
+    /// [`update`](Self::update) for tensors of any origin, in index coordinates.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn update_field(
+        &self,
+        map: DistanceMap,
+        field: TensorField,
+        stop: &Stop,
+        control: &Control,
+    ) -> Result<DistanceMap> {
+        if field.tiling != map.field.tiling || field.root_scale() != map.field.root_scale() {
+            return self.solve_again(DistanceMap { field, ..map }, stop, control);
+        }
+        let exchange = |old: &mut TensorField| {
+            let changed = differences(old, &field);
+            *old = field;
+            Ok(changed)
+        };
+        self.after(exchange, map, stop, control)
+    }
+
+    /// [`update`](Self::update) for single nodes: (column, row, tensor in index coordinates), `None` to close the node. The cost is that
+    /// of what is solved again, and some ns per node of the grid.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve); [`Error::Usage`] if a node is not on the grid.
+    pub fn update_nodes(
+        &self,
+        map: DistanceMap,
+        nodes: &[(usize, usize, Option<Sym2>)],
+        stop: &Stop,
+        control: &Control,
+    ) -> Result<DistanceMap> {
+        let set = |field: &mut TensorField| {
+            let set = |&(col, row, tensor): &_| {
+                field.set(col, row, tensor)?;
+                Ok(field.tiling.place(col, row))
+            };
+            nodes.iter().map(set).collect()
+        };
+        self.after(set, map, stop, control)
+    }
+
+    /// The distances after an edit of the field, which says the tile and the place in it of the nodes it changed.
+    fn after(
+        &self,
+        edit: impl FnOnce(&mut TensorField) -> Result<Vec<(usize, usize)>>,
+        mut map: DistanceMap,
+        stop: &Stop,
+        control: &Control,
+    ) -> Result<DistanceMap> {
+        stop.check()?;
+        let before = source::seeds(&map.field, &map.starts)?;
+        let mut changed = edit(&mut map.field)?;
+        let seeds = source::seeds(&map.field, &map.starts)?;
+        changed.extend(moved_seeds(&before, &seeds));
+        if map.errors.is_some() || Cones::new(&map.field, &map.starts) != map.cones {
+            return self.solve_again(map, stop, control);
+        }
+        let lost = clear(&mut map, &changed);
+        let equation = Equation {
+            field: &map.field,
+            cones: &map.cones,
+            seeds: &seeds,
+            tolerance: self.tolerance,
+        };
+        let news = News::Lost(&lost);
+        let left = tiles::solve(&equation, map.values, map.limits, news, &Stop::Never, control)?;
+        let Solution { values, limits, statistics: forgetting } = left.expect(
+            "settles: a tile is looked at again only where a node of it or around it was forgotten",
+        );
+        let map =
+            self.go_on(DistanceMap { values, limits, ..map }, &lost, &seeds, stop, control)?;
+        let statistics = Statistics {
+            activations: forgetting.activations + map.statistics.activations,
+            sweeps: forgetting.sweeps + map.statistics.sweeps,
+            rounds: forgetting.rounds + map.statistics.rounds,
+            ..map.statistics
+        };
+        Ok(DistanceMap { statistics, ..map })
+    }
+}
+
+/// Tile and place in it of the nodes whose tensors differ.
+fn differences(old: &TensorField, new: &TensorField) -> Vec<(usize, usize)> {
+    let differ = |(tile, (old, new)): (usize, (&TensorTile, &TensorTile))| {
+        let same = old.xx == new.xx && old.xy == new.xy && old.det == new.det;
+        let differs =
+            |&i: &usize| (old.xx[i], old.xy[i], old.det[i]) != (new.xx[i], new.xy[i], new.det[i]);
+        let places = if same { 0..0 } else { 0..AREA };
+        places.filter(differs).map(move |place| (tile, place)).collect::<Vec<_>>()
+    };
+    let tiles = old.tiles.par_iter().zip(&new.tiles).enumerate().with_min_len(64);
+    tiles.flat_map_iter(differ).collect()
+}
+
+/// Tile and place in it of the nodes whose start value changed, came or went.
+fn moved_seeds<'a>(
+    old: &'a [Option<Box<Seeds>>],
+    new: &'a [Option<Box<Seeds>>],
+) -> impl Iterator<Item = (usize, usize)> + 'a {
+    let at = |seeds: &Option<Box<Seeds>>, place: usize| {
+        seeds.as_ref().map_or(f32::INFINITY, |seeds| seeds[place])
+    };
+    let differing = old.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new);
+    differing.flat_map(move |(tile, (old, new))| {
+        (0..AREA).filter(move |&i| at(old, i) != at(new, i)).map(move |place| (tile, place))
+    })
+}
+
+/// Takes the values of these nodes away; for each tile the least of them.
+fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
+    let mut lost = vec![f32::INFINITY; map.values.tiles.len()];
+    for &(tile, place) in nodes {
+        let value = &mut map.values.tiles[tile][place];
+        lost[tile] = lost[tile].min(value.min(UNREACHED));
+        let open = map.field.tiles[tile].det[place] > 0.0;
+        *value = if open { UNREACHED } else { f32::INFINITY };
+    }
+    lost
+}
