@@ -424,9 +424,10 @@ pub(super) fn prepare_shifts(
     let (radius2, alike2) = ((cone.radius * cone.radius) as f32, (cone.alike * cone.alike) as f32);
     let [dxx, dxy, ddet] = tensors(tile, line, how);
     let mut largest = [0f32; SIDE];
-    let (x0, y) = (from.x as f32, (from.y + line as f64) as f32);
+    let y = (from.y + line as f64) as f32;
     for i in 0..SIDE {
-        let x = x0 + i as f32;
+        // Rounded once, so that rows and columns agree on which nodes the cone reaches.
+        let x = (from.x + i as f64) as f32;
         let r2 = x * x + y * y;
         let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
         let g2 = greatest(mx * x + my * y, 0.0);

@@ -97,3 +97,107 @@ proptest! {
         }
     }
 }
+
+/// A field that turns, of three times the speed along as across.
+fn turning(n: usize) -> TensorField {
+    field(n, n, |c, r| Some(rotated(9.0, 4.0 * (c + 2 * r) as f64 / n as f64)))
+}
+
+fn update_one(field: &TensorField, start: DVec2, edits: &Edits) -> [DistanceMap; 2] {
+    let [update, fresh] =
+        both(&Solver::default(), field, &[start.into()], edits, &Stop::Never).unwrap();
+    let difference = difference(&update, &fresh);
+    assert!(difference < 1e-3, "{difference:e}");
+    [update, fresh]
+}
+
+#[test]
+fn only_what_an_edit_is_felt_by_is_solved_again() {
+    let (f, start) = (turning(501), DVec2::splat(250.0));
+    let [update, fresh] = update_one(&f, start, &wall((460, 225), (0, 1), 50));
+    let (some, all) = (update.statistics(), fresh.statistics());
+    assert!(some.activations * 10 < all.activations, "{some:?} {all:?}");
+    assert!(some.sweeps * 10 < all.sweeps, "{some:?} {all:?}");
+    // The same again changes nothing.
+    let closed = wall((460, 225), (0, 1), 50);
+    let again =
+        Solver::default().update_nodes(update.clone(), &closed, &Stop::Never, &Control::default());
+    let again = again.unwrap();
+    assert!(difference(&again, &update) < 1e-4);
+    assert!(again.statistics().activations < 100, "{:?}", again.statistics());
+    // A node behind all others: the only value that changes is its own.
+    let [update, _] = update_one(&f, start, &vec![(0, 500, None)]);
+    assert!(update.statistics().activations < 10, "{:?}", update.statistics());
+}
+
+#[test]
+fn what_a_wall_cuts_off_is_unreached_until_it_is_opened() {
+    let (f, start) = (rough(130, 110), DVec2::new(8.0, 9.0));
+    let whole = solve_from(f.clone(), &[(start, 0.0)], &Stop::Never);
+    let [update, _] = update_one(&f, start, &wall((70, 0), (0, 1), 110));
+    assert!(whole.is_reached(100, 50) && !update.is_reached(100, 50) && update.is_reached(60, 50));
+    let opened =
+        (0..110).map(|row| (70, row, f.metric(70, row).map(Sym2::inverse))).collect::<Vec<_>>();
+    let scale = f.root_scale().powi(2);
+    let opened: Vec<_> = opened.into_iter().map(|(c, r, d)| (c, r, d.map(|d| d * scale))).collect();
+    let again = Solver::default().update_nodes(update, &opened, &Stop::Never, &Control::default());
+    let difference = difference(&again.unwrap(), &whole);
+    assert!(difference < 1e-3, "{difference:e}");
+}
+
+#[test]
+fn edits_at_the_start_move_it_or_leave_none() {
+    let (f, start) = (turning(90), DVec2::new(40.3, 50.8));
+    update_one(&f, start, &wall((41, 40), (0, 1), 20));
+    update_one(&f, start, &vec![(40, 51, Some(IDENTITY * 30.0))]);
+    let around: Edits =
+        (38..44).flat_map(|col| (48..54).map(move |row| (col, row, None))).collect();
+    let map = solve_from(f, &[(start, 0.0)], &Stop::Never);
+    let buried = Solver::default().update_nodes(map, &around, &Stop::Never, &Control::default());
+    assert!(buried.is_err());
+}
+
+#[test]
+fn whole_fields_are_compared_and_other_shapes_solved() {
+    let (solver, control) = (Solver::default(), Control::default());
+    let (f, start) = (turning(120), DVec2::new(30.0, 60.0));
+    let map = solve_from(f.clone(), &[(start, 0.0)], &Stop::Never);
+    let mut edited = f;
+    for row in 20..90 {
+        edited.set(70, row, None).unwrap();
+    }
+    for other in [edited, turning(150), field(120, 120, |_, _| Some(IDENTITY * 1e6))] {
+        let fresh = solve_from(other.clone(), &[(start, 0.0)], &Stop::Never);
+        let update = solver.update_field(map.clone(), other, &Stop::Never, &control).unwrap();
+        let difference = difference(&update, &fresh);
+        assert!(difference < 1e-3, "{difference:e}");
+    }
+    let outside = solver.update_nodes(map, &[(120, 0, None)], &Stop::Never, &control);
+    assert!(outside.is_err());
+}
+
+#[test]
+fn high_accuracy_survives_an_edit() {
+    let solver = Solver { accuracy: Accuracy::High, ..Solver::default() };
+    let start = [DVec2::new(30.0, 60.0).into()];
+    let [update, fresh] =
+        both(&solver, &turning(120), &start, &wall((70, 20), (0, 1), 60), &Stop::Never).unwrap();
+    assert_eq!(update.values.tiles, fresh.values.tiles);
+    assert!(update.error_at_node(100, 50).is_some());
+}
+
+#[test]
+fn thread_count_changes_no_bit_of_an_update() {
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            update_one(&turning(300), DVec2::splat(140.0), &wall((170, 100), (0, 1), 50))
+        })
+    };
+    let [one, _] = run(1);
+    for threads in [2, 4] {
+        let [map, _] = run(threads);
+        assert_eq!(map.values.tiles, one.values.tiles);
+        assert_eq!(map.statistics(), one.statistics());
+    }
+}
