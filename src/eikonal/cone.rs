@@ -35,6 +35,9 @@ const ALIKE: f32 = 1.3;
 /// neighbours' without end.
 const SIMILAR: f32 = 4.0;
 const MOST_SHIFT: f32 = 0.5;
+/// With more corners no cones are taken out: each is looked at for each tile, and the fans of the many corners of a fine outline
+/// are narrow.
+const MOST_CONES: usize = 1000;
 
 /// A point that geodesics fan out from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,7 +150,7 @@ impl Cones {
         let mut cones: Vec<Cone> = starts.iter().flat_map(of_start).filter(inside).collect();
         let tiling = field.tiling;
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
-        if cones.is_empty() || radius < POINT_RADIUS {
+        if cones.is_empty() || cones.len() > MOST_CONES || radius < POINT_RADIUS {
             return Self::default();
         }
         // No more nodes are looked at than there are, however many cones.

@@ -174,6 +174,21 @@ fn lines_and_areas_are_start_regions() {
 }
 
 #[test]
+fn an_outline_of_many_corners_is_as_good_a_start_as_a_circle() {
+    let (n, centre, radius) = (201, DVec2::splat(100.0), 30.0);
+    for corners in [500, 20_000] {
+        let angle = |i: usize| TAU * i as f64 / corners as f64;
+        let ring = (0..corners).map(|i| centre + radius * DVec2::from_angle(angle(i))).collect();
+        let start = [StartRegion { areas: vec![vec![ring]], ..StartRegion::default() }];
+        let (f, control) = (field(n, n, |_, _| Some(IDENTITY)), Control::default());
+        let map = Solver::default().solve_field(f, &start, &Stop::Never, &control).unwrap();
+        let exact = |c: usize, r: usize| DVec2::new(c as f64, r as f64).distance(centre) - radius;
+        let (worst, mean) = errors(&map, |c, r| Some(exact(c, r).max(0.0)));
+        assert!(worst < 2e-2 && mean < 5e-3, "{corners}: {worst:e} {mean:e}");
+    }
+}
+
+#[test]
 fn a_ring_given_closed_is_the_same_start() {
     let open: Vec<DVec2> =
         [[30.0, 30.0], [50.0, 34.0], [44.0, 52.0]].into_iter().map(DVec2::from).collect();
