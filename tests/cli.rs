@@ -181,6 +181,18 @@ fn distance_writes_rasters_isolines_and_statistics() {
 }
 
 #[test]
+fn high_accuracy_estimates_its_error() {
+    let folder = Folder::new();
+    let line = "distance range.tif --start pixel:5,5 --metric isotropic -o d.tif --error --stats";
+    let text = folder.good(&format!("{line} --accuracy high"));
+    for part in ["mean estimated error", " sweeps per node, ", "20 bytes per node"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(is_tiff(&folder.path("d.tif")));
+    folder.bad(line, 2, "--error needs --accuracy high");
+}
+
+#[test]
 fn labels_tell_the_starts_apart_and_a_largest_distance_ends_the_map() {
     let folder = Folder::new();
     let line = "distance range.tif --start pixel:5,20 --start pixel:55,20 --metric isotropic";
