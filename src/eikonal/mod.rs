@@ -51,7 +51,7 @@ pub enum Accuracy {
     /// First order in the spacing.
     #[default]
     Fast,
-    /// Second order, by deferred correction, with an estimate of the error at each node; takes four to five times as long.
+    /// Second order, by deferred correction, with an estimate of the error at each node; takes 3.5 to 5 times as long.
     High,
 }
 
