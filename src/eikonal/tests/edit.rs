@@ -51,8 +51,8 @@ fn any_field() -> impl Strategy<Value = TensorField> {
     });
     let maze = (2..6usize, 3..9usize, any::<u64>()).prop_map(|(width, gap, seed)| {
         field(60, 50, |c, r| {
-            let wall =
-                c % (width + 1) == width && (r + (seed >> (c % 32)) as usize) % (gap + 8) > 0;
+            let wall = c % (width + 1) == width
+                && !(r + (seed >> (c % 32)) as usize % 64).is_multiple_of(gap + 8);
             (!wall).then_some(rotated(4.0, 0.3))
         })
     });
