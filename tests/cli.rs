@@ -189,7 +189,7 @@ fn high_accuracy_estimates_its_error() {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(is_tiff(&folder.path("d.tif")));
-    folder.bad(line, 2, "--error needs --accuracy high");
+    folder.bad(line, 2, "--error needs --accuracy high: only then the error is estimated");
 }
 
 #[test]
