@@ -137,9 +137,7 @@ impl Solver {
         if self.accuracy == Accuracy::Fast {
             return Ok(None);
         }
-        let correction = correction::correct(field, cones, &values.tiles, seeds, control)?;
-        values.add(&correction.values);
-        Ok(Some(correction.errors))
+        correction::correct(field, cones, &mut values.tiles, seeds, control).map(Some)
     }
 
     /// Goes on with a map that a [`Stop`] ended, without solving again what is final. The outcome is that of a solve

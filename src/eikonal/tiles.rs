@@ -62,13 +62,6 @@ impl Values {
         let old = &mut self.tiles[tile][place];
         *old = old.min(value);
     }
-
-    /// Adds corrections to the values.
-    pub(super) fn add(&mut self, corrections: &[[f32; AREA]]) {
-        for (values, corrections) in self.tiles.iter_mut().zip(corrections) {
-            values.iter_mut().zip(corrections).for_each(|(value, correction)| *value += correction);
-        }
-    }
 }
 
 /// How much work a solve took: the same on every machine and for every number of threads.

@@ -1,4 +1,4 @@
-//! Where values come from, and what the functional needs to know there.
+//! Where values come from, and what the functional says there.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
@@ -7,337 +7,354 @@ use multiversion::multiversion;
 use super::super::cone::Cones;
 use super::super::field::{AREA, SIDE, TensorField};
 use super::super::source::Seeds;
-use super::super::update::{
-    How, Limits, Prepared, RING, Tile, UNREACHED, choose, greatest, lanes, least, pass, prepare,
-    prepare_shifts,
-};
-use super::functional::{minimise, minimise_in_cone};
-use super::patch::{Lanes, MARGIN, Patch, WIDE, patch, seen};
+use super::super::update::{How, Limits, RING, Tile, UNREACHED, choose, lanes, prepare_shifts};
+use super::functional::{ConeAt, Foot};
+use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
+use super::triangle::Triangle;
 
-/// Where the values of a tile's nodes come from, and what the functional of second order adds there.
+/// Where the values of a tile's nodes come from, and what the functional of second order adds there; by rows or, where
+/// `by_columns`, by columns.
 #[derive(Clone)]
 pub(super) struct Feet {
-    /// Index into [`TRIANGLES`]; [`FIXED`] for a node that is not corrected.
+    /// Bits of a [`Triangle`].
     pub(super) triangle: [u8; AREA],
     /// Share of the diagonal neighbour.
     pub(super) theta: [f32; AREA],
     pub(super) rho: [f32; AREA],
-    /// Neighbours of the tile that it reads, one bit each as in [`RING`].
-    pub(super) reads: u8,
-    /// Sum of the directions from the nodes to where their values come from: east, south.
-    pub(super) flow: [i32; 2],
+    /// Whether most comes along the rows, and then whether it comes from the end of the columns or rows.
+    pub(super) by_columns: bool,
+    pub(super) descending: bool,
+    /// What each line reads, in bits.
+    pub(super) reads: [u8; SIDE],
 }
 
-pub(super) const FIXED: u8 = 8;
-
-/// The triangles around a node: places in [`RING`] of the axis and the diagonal neighbour.
-pub(super) const TRIANGLES: [(usize, usize); 8] =
-    [(0, 1), (4, 5), (2, 1), (6, 5), (0, 7), (4, 3), (2, 3), (6, 7)];
+/// Bits of the lines that a line reads: the one before it, itself, the one behind.
+pub(super) const BEFORE: u32 = 1;
+pub(super) const ITSELF: u32 = 2;
+pub(super) const BEHIND: u32 = 4;
 
 /// What the feet of a tile are made from.
 pub(super) struct Input<'a> {
     pub(super) field: &'a TensorField,
     pub(super) cones: &'a Cones,
     pub(super) values: &'a [[f32; AREA]],
-    pub(super) total: &'a [[f32; AREA]],
+    /// Corrections of the rounds before; none in the first.
+    pub(super) total: Option<&'a [[f32; AREA]]>,
     pub(super) seeds: &'a [Option<Box<Seeds>>],
 }
 
-/// Room to find the feet of a tile.
-#[derive(Default)]
-pub(super) struct Finder {
-    prepared: Prepared,
-    line: Line,
+/// What surrounds tiles side by side.
+pub(super) struct Surroundings {
+    g: Strip,
+    e: Strip,
+    /// `M` as xx, xy, yy, and its determinant; 0 where closed.
+    metric: [Strip; 4],
 }
 
-impl Finder {
-    pub(super) fn find(&mut self, input: &Input<'_>, tile: usize, feet: &mut Feet) {
+impl Default for Surroundings {
+    fn default() -> Self {
+        let strip = [[0.0; WIDE]; SIDE + 2 * MARGIN];
+        Self { g: strip, e: strip, metric: [strip; 4] }
+    }
+}
+
+impl Surroundings {
+    /// Finds the feet of tiles side by side, `first` and those after it, and the neighbours of each that it reads, one bit
+    /// each as in [`RING`].
+    pub(super) fn find(
+        &mut self,
+        input: &Input<'_>,
+        first: usize,
+        feet: &mut [Feet],
+        reads: &mut [u8],
+    ) {
         let field = input.field;
         let tiling = &field.tiling;
-        *feet = Feet::NONE;
-        if input.values[tile].iter().all(|&g| g >= UNREACHED) {
-            return;
+        let reached = |tile: usize| input.values[tile].iter().any(|&g| g < UNREACHED);
+        let tiles = feet.len();
+        if !(first..first + tiles).any(reached) {
+            feet.fill(Feet::NONE);
+            return reads.fill(0);
         }
-        let g = patch(tiling, tile, f32::INFINITY, |t| &input.values[t]);
-        let e = patch(tiling, tile, 0.0, |t| &input.total[t]);
-        let mut metric = [
-            patch(tiling, tile, 0.0, |t| &field.tiles[t].xx),
-            patch(tiling, tile, 0.0, |t| &field.tiles[t].xy),
-            patch(tiling, tile, 0.0, |t| &field.tiles[t].det),
-        ];
-        invert(&mut metric);
-        let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
-        let seeds = input.seeds[tile].as_deref();
-        let this = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
-        for row in 0..SIDE {
-            find_triangles(&this, &mut self.prepared, &g, &e, row, &mut self.line);
-            gather(&g, &e, &metric, row, &mut self.line);
-            let shifts = &self.prepared.shifts[row];
-            if cone.is_some() {
-                minimise_in_cone(&this, row, shifts, &mut self.line);
-            } else {
-                minimise(&this, row, shifts, &mut self.line);
-            }
-            let places = row * SIDE..(row + 1) * SIDE;
-            feet.theta[places.clone()].copy_from_slice(&self.line.theta);
-            feet.rho[places.clone()].copy_from_slice(&self.line.rho);
-            for (triangle, from) in feet.triangle[places].iter_mut().zip(self.line.triangle) {
-                *triangle = from as u8;
-            }
+        let part = (first, tiles);
+        fill(&mut self.g, tiling, part, f32::INFINITY, |t| &input.values[t]);
+        if let Some(total) = input.total {
+            fill(&mut self.e, tiling, part, 0.0, |t| &total[t]);
         }
-        for place in 0..AREA {
-            let seeded = seeds.is_some_and(|seeds| seeds[place] < UNREACHED);
-            if seeded || input.values[tile][place] >= UNREACHED {
-                (feet.triangle[place], feet.theta[place], feet.rho[place]) = (FIXED, 0.0, 0.0);
-            }
+        let [xx, xy, det, _] = &mut self.metric;
+        fill(xx, tiling, part, 0.0, |t| &field.tiles[t].xx);
+        fill(xy, tiling, part, 0.0, |t| &field.tiles[t].xy);
+        fill(det, tiling, part, 0.0, |t| &field.tiles[t].det);
+        invert(&mut self.metric);
+        for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {
+            let tile = first + k;
+            let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
+            let seeds = input.seeds[tile].as_deref();
+            let tile = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
+            *reads = find(self, k * SIDE, &tile, feet);
         }
-        feet.find_reads();
-        feet.find_flow();
     }
 }
 
 impl Feet {
     pub(super) const NONE: Self = Self {
-        triangle: [FIXED; AREA],
+        triangle: [Triangle::NONE as u8; AREA],
         theta: [0.0; AREA],
         rho: [0.0; AREA],
-        reads: 0,
-        flow: [0; 2],
+        by_columns: false,
+        descending: false,
+        reads: [0; SIDE],
     };
 
-    fn find_flow(&mut self) {
-        for (&triangle, &theta) in self.triangle.iter().zip(&self.theta) {
-            if triangle != FIXED {
-                let (a, b) = TRIANGLES[triangle as usize];
-                let (dx, dy) = RING[if theta < 0.5 { a } else { b }];
-                self.flow[0] += dx;
-                self.flow[1] += dy;
-            }
-        }
-    }
-
-    /// The tile mirrored on its diagonal.
-    pub(super) fn transposed(&self) -> Self {
-        /// What becomes of [`TRIANGLES`].
-        const MIRRORED: [u8; 9] = [2, 3, 0, 1, 6, 7, 4, 5, FIXED];
-        let [east, south] = self.flow;
-        let mut turned = Self { flow: [south, east], ..Self::NONE };
-        for row in 0..SIDE {
-            for col in 0..SIDE {
-                let (from, to) = (row * SIDE + col, col * SIDE + row);
-                turned.triangle[to] = MIRRORED[self.triangle[from] as usize];
-                turned.theta[to] = self.theta[from];
-                turned.rho[to] = self.rho[from];
-            }
-        }
-        turned
-    }
-
-    fn find_reads(&mut self) {
-        const LAST: usize = SIDE - 1;
-        for place in 0..AREA {
-            let (row, col) = (place / SIDE, place % SIDE);
-            let inside = (1..LAST).contains(&row) && (1..LAST).contains(&col);
-            if !inside && self.triangle[place] != FIXED {
-                let (a, b) = TRIANGLES[self.triangle[place] as usize];
-                self.reads |= outside(col, row, a, 1.0 - self.theta[place]);
-                self.reads |= outside(col, row, b, self.theta[place]);
-            }
-        }
-    }
-}
-
-/// The neighbouring tile, if any, that holds the ring's place `k` of a node, as a bit.
-fn outside(col: usize, row: usize, k: usize, weight: f32) -> u8 {
-    /// Bits of the places in [`RING`], by row and column from −1.
-    const BITS: [[u8; 3]; 3] = [[1 << 5, 1 << 6, 1 << 7], [1 << 4, 0, 1], [1 << 3, 1 << 2, 1 << 1]];
-    let side = |at: usize, by: i32| (at as i32 + by + SIDE as i32) as usize / SIDE;
-    if weight > 0.0 { BITS[side(row, RING[k].1)][side(col, RING[k].0)] } else { 0 }
-}
-
-/// Intermediate results of a line of a tile.
-#[derive(Default)]
-pub(super) struct Line {
-    pub(super) triangle: [u32; SIDE],
-    /// Difference `g(b) − g(a)` as the first-order update reads it, and the foot that follows.
-    pub(super) slope: [f32; SIDE],
-    pub(super) theta: [f32; SIDE],
-    pub(super) rho: [f32; SIDE],
-    /// `g + e` at `a`, `b`, `2a − b`, `2b − a` less that at the node; a large value where unreached.
-    pub(super) rise: [[f32; SIDE]; 4],
-    /// `M` at `a` and `b`: xx, xy, yy; xx is 0 where closed.
-    pub(super) metric: [[f32; SIDE]; 6],
-    /// `a` and `b − a` from the node.
-    pub(super) a: [[f32; SIDE]; 2],
-    pub(super) w: [[f32; SIDE]; 2],
-}
-
-/// The triangle that gives each node of a line its first-order value.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn find_triangles(
-    tile: &Tile<'_>,
-    prepared: &mut Prepared,
-    g: &Patch,
-    e: &Patch,
-    row: usize,
-    line: &mut Line,
-) {
-    let how = How { by_columns: false, descending: false };
-    let mut limits = Limits::default();
-    prepare(tile, row, how, &mut prepared.lines[row], &mut limits);
-    prepared.shifts[row] = [[0.0; SIDE]; 8];
-    if tile.cone.is_some() {
-        prepare_shifts(tile, row, how, &mut prepared.shifts[row], &mut limits);
-    }
-    let k = &prepared.lines[row];
-    let mut ring = [[0f32; SIDE]; 8];
-    for (n, ring) in ring.iter_mut().enumerate() {
-        let (dx, dy) = RING[n];
-        let at = (row as i32 + dy + MARGIN as i32) as usize;
-        let from = (dx + MARGIN as i32) as usize;
-        let (g, e) = (lanes(&g[at], from), lanes(&e[at], from));
-        for i in 0..SIDE {
-            ring[i] = g[i] + (e[i] + prepared.shifts[row][n][i]);
-        }
-    }
-    for n in [1, 3, 5, 7] {
-        for i in 0..SIDE {
-            ring[n][i] = pass(ring[n][i], ring[n - 1][i], ring[(n + 1) % 8][i]);
-        }
-    }
-    let mut best = Best { value: [f32::INFINITY; SIDE], ..Best::default() };
-    let [e, se, s, sw, w, nw, n, ne] = &ring;
-    let (hx, hy, bx, by) = (negated(&k.hx), negated(&k.hy), negated(&k.bx), negated(&k.by));
-    let x = (&k.rx, &k.hx, &k.ix, &k.ex, &k.bx, &k.rising);
-    let y = (&k.ry, &k.hy, &k.iy, &k.ey, &k.by, &k.rising);
-    let across_x = (&k.fx, &hx, &k.ix, &k.ex, &bx, &k.falling);
-    let across_y = (&k.fy, &hy, &k.iy, &k.ey, &by, &k.falling);
-    best.offer(0, e, se, x);
-    best.offer(1, w, nw, x);
-    best.offer(2, s, se, y);
-    best.offer(3, n, nw, y);
-    best.offer(4, e, ne, across_x);
-    best.offer(5, w, sw, across_x);
-    best.offer(6, s, sw, across_y);
-    best.offer(7, n, ne, across_y);
-    line.triangle = best.triangle;
-    line.slope = best.slope;
-}
-
-#[inline(always)]
-fn negated(lanes: &Lanes) -> Lanes {
-    let mut negated = *lanes;
-    for lane in &mut negated {
-        *lane = -*lane;
-    }
-    negated
-}
-
-/// The best triangle so far of each node.
-#[derive(Default)]
-struct Best {
-    value: Lanes,
-    slope: Lanes,
-    triangle: [u32; SIDE],
-}
-
-impl Best {
-    /// The triangle `t` between `a` and `b`, with `lo`, `hi`, `1/s`, `det D/s²`, `β/s` and the length of the step to `b`.
+    /// Mirrors the tile on its diagonal.
     #[inline(always)]
-    fn offer(
-        &mut self,
-        t: u32,
-        a: &Lanes,
-        b: &Lanes,
-        (lo, hi, ix, ex, beta, length): (&Lanes, &Lanes, &Lanes, &Lanes, &Lanes, &Lanes),
-    ) {
-        for i in 0..SIDE {
-            let d = b[i] - a[i];
-            let c = greatest(least(d, hi[i]), lo[i]);
-            let between = a[i] + (beta[i] * c + greatest(ix[i] - ex[i] * (c * c), 0.0).sqrt());
-            let value = choose(d < lo[i], b[i] + length[i], between);
-            let better = value < self.value[i];
-            self.value[i] = choose(better, value, self.value[i]);
-            self.slope[i] = choose(better, d, self.slope[i]);
-            self.triangle[i] = if better { t } else { self.triangle[i] };
+    fn transpose(&mut self) {
+        for row in 0..SIDE {
+            for col in 0..row {
+                let (i, j) = (row * SIDE + col, col * SIDE + row);
+                self.triangle.swap(i, j);
+                self.theta.swap(i, j);
+                self.rho.swap(i, j);
+            }
+        }
+        for triangle in &mut self.triangle {
+            *triangle ^= Triangle::ALONG_Y as u8;
         }
     }
 }
 
-/// `M = D⁻¹` as xx, xy, yy from `D` as xx, xy, det; xx is 0 where closed.
+/// `M = D⁻¹` as xx, xy, yy and its determinant, 0 where closed, from `D` as xx, xy, det.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn invert(d: &mut [Patch; 3]) {
-    let [xx, xy, det] = d;
-    for row in 0..WIDE {
+fn invert([xx, xy, yy, det]: &mut [Strip; 4]) {
+    for row in MARGIN - 1..SIDE + MARGIN + 1 {
         for i in 0..WIDE {
-            let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], det[row][i]);
-            let (open, idet) = (ddet > 0.0, 1.0 / ddet);
-            xx[row][i] = choose(open, (ddet + dxy * dxy) / dxx * idet, 0.0);
+            let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], yy[row][i]);
+            let (open, inverse) = (ddet > 0.0, 1.0 / (dxx * ddet));
+            let idet = dxx * inverse;
+            xx[row][i] = choose(open, (ddet + dxy * dxy) * inverse, 0.0);
             xy[row][i] = choose(open, -dxy * idet, 0.0);
-            det[row][i] = choose(open, dxx * idet, 0.0);
+            yy[row][i] = choose(open, dxx * idet, 0.0);
+            det[row][i] = choose(open, idet, 0.0);
         }
     }
 }
 
-/// How much higher than the nodes of a row those at `(dx, dy)` from them are.
+/// How much higher than the nodes of a row those at places from them are.
 #[inline(always)]
-fn rise(g: &Patch, e: &Patch, row: usize, dx: i32, dy: i32) -> Lanes {
-    let (g0, e0) = (seen(g, row, 0, 0), seen(e, row, 0, 0));
-    let (g1, e1) = (seen(g, row, dx, dy), seen(e, row, dx, dy));
-    let mut rise = [0f32; SIDE];
-    for i in 0..SIDE {
-        rise[i] = (g1[i] - g0[i]) + (e1[i] - e0[i]);
+fn rises<const N: usize>(
+    g: &Strip,
+    e: &Strip,
+    at: (usize, usize),
+    places: [(i32, i32); N],
+) -> [Lanes; N] {
+    let (g0, e0) = (seen(g, at, (0, 0)), seen(e, at, (0, 0)));
+    let mut rises = [[0f32; SIDE]; N];
+    for k in 0..N {
+        let (g1, e1) = (seen(g, at, places[k]), seen(e, at, places[k]));
+        for i in 0..SIDE {
+            rises[k][i] = (g1[i] - g0[i]) + (e1[i] - e0[i]);
+        }
     }
-    rise
+    rises
 }
 
-/// What the functional needs from around each node's foot.
+/// Finds the feet of the tile that begins at column `from`; the neighbours that it reads.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn gather(g: &Patch, e: &Patch, metric: &[Patch; 3], row: usize, line: &mut Line) {
-    let triangle = line.triangle;
-    let (mut rises, mut metrics) = ([[0f32; SIDE]; 4], [[0f32; SIDE]; 6]);
-    let (mut a, mut w) = ([[0f32; SIDE]; 2], [[0f32; SIDE]; 2]);
-    for t in 0..8 {
-        let (axis, diagonal) = TRIANGLES[t];
-        let ((ax, ay), (bx, by)) = (RING[axis], RING[diagonal]);
-        let (wx, wy) = (bx - ax, by - ay);
-        blend(t, triangle, rise(g, e, row, ax, ay), &mut rises[0]);
-        blend(t, triangle, rise(g, e, row, bx, by), &mut rises[1]);
-        blend(t, triangle, rise(g, e, row, ax - wx, ay - wy), &mut rises[2]);
-        blend(t, triangle, rise(g, e, row, bx + wx, by + wy), &mut rises[3]);
-        for n in 0..3 {
-            blend(t, triangle, seen(&metric[n], row, ax, ay), &mut metrics[n]);
-            blend(t, triangle, seen(&metric[n], row, bx, by), &mut metrics[3 + n]);
+fn find(around: &Surroundings, from: usize, tile: &Tile<'_>, feet: &mut Feet) -> u8 {
+    let mut course = Course::default();
+    for row in 0..SIDE {
+        if tile.cone.is_some() {
+            find_line::<true>(around, (from, row), tile, feet, &mut course);
+        } else {
+            find_line::<false>(around, (from, row), tile, feet, &mut course);
         }
-        blend(t, triangle, [ax as f32; SIDE], &mut a[0]);
-        blend(t, triangle, [ay as f32; SIDE], &mut a[1]);
-        blend(t, triangle, [wx as f32; SIDE], &mut w[0]);
-        blend(t, triangle, [wy as f32; SIDE], &mut w[1]);
     }
-    line.rise = rises;
-    line.metric = metrics;
-    line.a = a;
-    line.w = w;
+    course.set(feet)
 }
 
-/// Takes the lanes of triangle `t`.
+/// Finds the feet of a row of a tile.
 #[inline(always)]
-fn blend(t: usize, triangle: [u32; SIDE], from: Lanes, to: &mut Lanes) {
-    let (old, mut new) = (*to, [0f32; SIDE]);
-    for i in 0..SIDE {
-        new[i] = choose(triangle[i] == t as u32, from[i], old[i]);
+fn find_line<const IN_CONE: bool>(
+    Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
+    at: (usize, usize),
+    tile: &Tile<'_>,
+    feet: &mut Feet,
+    course: &mut Course,
+) {
+    let row = at.1;
+    let mut shifts = [[0f32; SIDE]; 8];
+    let (mut m0, mut origin) = ([1.0, 0.0, 1.0], [1.0, 0.0]);
+    if let Some((cone, first)) = tile.cone {
+        let how = How { by_columns: false, descending: false };
+        prepare_shifts(tile, row, how, &mut shifts, &mut Limits::default());
+        m0 = [cone.metric.xx as f32, cone.metric.xy as f32, cone.metric.yy as f32];
+        origin = [(first.x - cone.at.x) as f32, (first.y + row as f64 - cone.at.y) as f32];
     }
-    *to = new;
+    let ring = rises(g, e, at, RING);
+    // Beside the axis neighbours, two lines from that of the node, on either side.
+    let before = rises(g, e, at, [(1, -2), (-2, 1), (-1, -2), (-2, -1)]);
+    let behind = rises(g, e, at, [(1, 2), (2, 1), (-1, 2), (2, -1)]);
+    let metrics = [around(xx, at), around(xy, at), around(yy, at)];
+    let own = (0, 0);
+    let (xx, xy, yy) = (seen(xx, at, own), seen(xy, at, own), seen(yy, at, own));
+    let (g, det) = (seen(g, at, own), seen(det, at, own));
+    let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
+    let (mut triangles, mut thetas, mut rhos) = ([0u32; SIDE], [0f32; SIDE], [0f32; SIDE]);
+    for i in 0..SIDE {
+        let ring = around_node(&ring, i);
+        let (mut shifted, mut on) = (ring, 0.0);
+        if IN_CONE {
+            for k in 0..8 {
+                shifted[k] += shifts[k][i];
+                on = choose(shifts[k][i] < 0.0, 1.0, on);
+            }
+        }
+        let here = [xx[i], xy[i], yy[i]];
+        let (bits, slope) = Triangle::best(shifted, here, det[i]);
+        let triangle = Triangle::from_bits(bits);
+        let far = |[e, s, w, n]: &[Lanes; 4]| triangle.side(e[i], s[i], w[i], n[i]);
+        let (xx, xy, yy) =
+            (around_node(&metrics[0], i), around_node(&metrics[1], i), around_node(&metrics[2], i));
+        let axis = [triangle.axis(xx), triangle.axis(xy), triangle.axis(yy)];
+        let diagonal = [triangle.diagonal(xx), triangle.diagonal(xy), triangle.diagonal(yy)];
+        let foot = Foot {
+            rise: [
+                triangle.axis(ring),
+                triangle.diagonal(ring),
+                triangle.opposite(ring),
+                choose(triangle.backwards(), far(&before), far(&behind)),
+            ],
+            slope,
+            here: triangle.mirror(here),
+            at_a: triangle.mirror(axis),
+            at_b: triangle.mirror(diagonal),
+            cone: ConeAt::new(
+                on,
+                triangle.mirror(m0),
+                triangle.mirror_place([origin[0] + i as f32, origin[1]]),
+            ),
+        };
+        let (theta, rho) = foot.minimise::<IN_CONE>();
+        let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED);
+        triangles[i] = if fixed { Triangle::NONE } else { bits };
+        thetas[i] = choose(fixed, 0.0, theta);
+        rhos[i] = choose(fixed, 0.0, rho);
+    }
+    course.add(row, &triangles, &thetas);
+    let places = row * SIDE..(row + 1) * SIDE;
+    feet.theta[places.clone()].copy_from_slice(&thetas);
+    feet.rho[places.clone()].copy_from_slice(&rhos);
+    for (to, triangle) in feet.triangle[places].iter_mut().zip(triangles) {
+        *to = triangle as u8;
+    }
+}
+
+/// What the rows and the columns of a tile read, and the sum of the directions from the nodes to where their values
+/// come from.
+#[derive(Default)]
+struct Course {
+    rows: [u8; SIDE],
+    cols: [u32; SIDE],
+    east: [i32; SIDE],
+    south: [i32; SIDE],
+}
+
+impl Course {
+    /// Adds a row.
+    #[inline(always)]
+    fn add(&mut self, row: usize, triangles: &[u32; SIDE], thetas: &Lanes) {
+        let mut reads = 0;
+        for i in 0..SIDE {
+            let Triangle { negative, along_y, .. } = Triangle::from_bits(triangles[i]);
+            let backwards = Triangle::from_bits(triangles[i]).backwards();
+            let fixed = triangles[i] == Triangle::NONE;
+            // Along the axis the line of both neighbours, across it the own one, that of the diagonal neighbour, or both.
+            let bit = |negative: bool| if negative { BEFORE } else { BEHIND };
+            let own = if thetas[i] < 1.0 { ITSELF } else { 0 };
+            let other = if thetas[i] > 0.0 { bit(backwards) } else { 0 };
+            let (along, across) = (bit(negative), own | other);
+            self.cols[i] |= if fixed {
+                0
+            } else if along_y {
+                across
+            } else {
+                along
+            };
+            reads |= if fixed {
+                0
+            } else if along_y {
+                along
+            } else {
+                across
+            };
+            let step = |negative: bool| if negative { -1 } else { 1 };
+            let (along, across) =
+                (step(negative), if thetas[i] < 0.5 { 0 } else { step(backwards) });
+            self.east[i] += if fixed {
+                0
+            } else if along_y {
+                across
+            } else {
+                along
+            };
+            self.south[i] += if fixed {
+                0
+            } else if along_y {
+                along
+            } else {
+                across
+            };
+        }
+        self.rows[row] = reads as u8;
+    }
+
+    /// Sets the feet's way of being swept; the neighbouring tiles that they read.
+    #[inline(always)]
+    fn set(&self, feet: &mut Feet) -> u8 {
+        let mut cols = [0u8; SIDE];
+        for i in 0..SIDE {
+            cols[i] = self.cols[i] as u8;
+        }
+        let (east, south) = (self.east.iter().sum::<i32>(), self.south.iter().sum::<i32>());
+        let reads = neighbours_read(&feet.triangle, &self.rows, &cols);
+        // By columns where most comes along the rows, and against the direction it comes from.
+        feet.by_columns = east.abs() > south.abs();
+        if feet.by_columns {
+            (feet.descending, feet.reads) = (east > 0, cols);
+            feet.transpose();
+        } else {
+            (feet.descending, feet.reads) = (south > 0, self.rows);
+        }
+        reads
+    }
+}
+
+/// The neighbouring tiles that a tile reads, one bit each as in [`RING`]; perhaps one too many at a corner.
+fn neighbours_read(triangle: &[u8; AREA], rows: &[u8; SIDE], cols: &[u8; SIDE]) -> u8 {
+    const LAST: usize = SIDE - 1;
+    let corner = |place: usize, falling: bool, west: bool| {
+        let bits = u32::from(triangle[place]);
+        let t = Triangle::from_bits(bits);
+        let to_west = if t.along_y { t.backwards() } else { t.negative };
+        bits != Triangle::NONE && t.falling == falling && to_west == west
+    };
+    let bits = [
+        u32::from(cols[LAST]) & BEHIND != 0,
+        corner(AREA - 1, false, false),
+        u32::from(rows[LAST]) & BEHIND != 0,
+        corner(AREA - SIDE, true, true),
+        u32::from(cols[0]) & BEFORE != 0,
+        corner(0, false, true),
+        u32::from(rows[0]) & BEFORE != 0,
+        corner(LAST, true, false),
+    ];
+    bits.into_iter().enumerate().fold(0, |set, (k, bit)| set | u8::from(bit) << k)
 }

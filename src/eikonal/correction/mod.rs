@@ -22,63 +22,78 @@
 
 mod feet;
 mod functional;
-mod patch;
+mod strip;
 mod transport;
+mod triangle;
 
 use rayon::prelude::*;
 
-use self::feet::{Feet, Finder, Input};
+use self::feet::{Feet, Input, Surroundings};
+use self::strip::STRIP;
+use self::transport::Ways;
 use super::cone::Cones;
-use super::field::{AREA, TensorField};
+use super::field::{AREA, SIDE, TensorField};
 use super::source::Seeds;
-use super::update::ROUNDING;
+use super::update::{ROUNDING, UNREACHED, least};
 use crate::{Control, Result};
 
-/// Rounds of correction. In a prototype the first left .3 to 7 % of the first-order error, the second gained up to a factor
-/// of 6 at ratios of 100 and more, and further ones little.
-const ROUNDS: usize = 2;
-/// The transport of a round stands still when nothing changes by more than this many mean cells. What the first leaves
-/// undone the second sees.
-const TOLERANCE_CELLS: [f32; ROUNDS] = [1e-4, 1e-5];
+/// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first
+/// leaves undone the second sees. In a prototype the first round left .3 to 7 % of the first-order error, the
+/// second gained up to a factor of 6 at ratios of 100 and more, and further ones little.
+const TOLERANCE_CELLS: [f32; 2] = [1e-4, 1e-5];
 
-/// Corrections of the nodes of each tile, and estimates of the error that is left.
-pub(super) struct Correction {
-    pub(super) values: Vec<[f32; AREA]>,
-    pub(super) errors: Vec<[f32; AREA]>,
-}
-
-/// Corrects first-order values; nodes of the start keep theirs.
+/// Brings first-order values to second order, nodes of the start excepted; estimates of the errors that are left.
 pub(super) fn correct(
     field: &TensorField,
     cones: &Cones,
-    values: &[[f32; AREA]],
+    values: &mut [[f32; AREA]],
     seeds: &[Option<Box<Seeds>>],
     control: &Control,
-) -> Result<Correction> {
-    let tiles = field.tiling.tiles();
-    let mut total = vec![[0f32; AREA]; tiles];
-    let mut last = Vec::new();
-    let mut feet = vec![Feet::NONE; tiles];
-    for tolerance in TOLERANCE_CELLS {
-        let input = Input { field, cones, values, total: &total, seeds };
-        feet.par_iter_mut().enumerate().try_for_each_init(
-            Finder::default,
-            |bench, (tile, feet)| {
+) -> Result<Vec<[f32; AREA]>> {
+    let tiling = field.tiling;
+    let keys: Vec<f32> = values.par_iter().map(least_of).collect();
+    let mut order: Vec<u32> =
+        (0..tiling.tiles() as u32).filter(|&t| keys[t as usize] < UNREACHED).collect();
+    order.sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
+    let mut feet = vec![Feet::NONE; tiling.tiles()];
+    let mut reads = vec![0; tiling.tiles()];
+    let mut round = |total: Option<&[[f32; AREA]]>, tolerance: f32| {
+        let input = Input { field, cones, values, total, seeds };
+        let rows = feet.par_chunks_mut(tiling.across).zip(reads.par_chunks_mut(tiling.across));
+        rows.enumerate().try_for_each_init(
+            Surroundings::default,
+            |around, (row, (feet, reads))| {
                 control.check()?;
-                bench.find(&input, tile, feet);
+                let strips = feet.chunks_mut(STRIP).zip(reads.chunks_mut(STRIP)).enumerate();
+                for (k, (feet, reads)) in strips {
+                    around.find(&input, row * tiling.across + k * STRIP, feet, reads);
+                }
                 Ok(())
             },
         )?;
-        last = transport::carry(field, values, &feet, tolerance * field.mean_step, control)?;
-        total.par_iter_mut().zip(&last).for_each(|(total, last)| {
-            total.iter_mut().zip(last).for_each(|(total, last)| *total += last);
-        });
-    }
-    let errors = total.par_iter().zip(&last).zip(values).map(|((total, last), values)| {
-        std::array::from_fn(|i| error_left(values[i], total[i], last[i]))
+        let ways = Ways { feet: &feet, reads: &reads, keys: &keys, order: &order };
+        transport::carry(field, &ways, tolerance * field.mean_step, control)
+    };
+    let first = round(None, TOLERANCE_CELLS[0])?;
+    let mut second = round(Some(&first), TOLERANCE_CELLS[1])?;
+    values.par_iter_mut().zip(&first).zip(&mut second).for_each(|((values, first), second)| {
+        for i in 0..AREA {
+            let total = first[i] + second[i];
+            (values[i], second[i]) = (values[i] + total, error_left(values[i], total, second[i]));
+        }
     });
-    let errors = errors.collect();
-    Ok(Correction { values: total, errors })
+    Ok(second)
+}
+
+/// The least value of a tile.
+fn least_of(tile: &[f32; AREA]) -> f32 {
+    let mut lowest = [f32::INFINITY; SIDE];
+    for row in tile.as_chunks::<SIDE>().0 {
+        for i in 0..SIDE {
+            lowest[i] = least(row[i], lowest[i]);
+        }
+    }
+    lowest.into_iter().fold(f32::INFINITY, f32::min)
 }
 
 /// What may be wrong with a corrected value: the last round's change, the share of the correction that is typically

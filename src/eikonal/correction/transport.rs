@@ -3,14 +3,15 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use multiversion::multiversion;
-use rayon::prelude::*;
 
+use super::super::board::Board;
 use super::super::crew;
-use super::super::field::{AREA, SIDE, TensorField, Tiling};
-use super::super::tiles::{ITSELF, Job, NEIGHBOURS, Queue, WINDOW_CELLS, neighbour};
-use super::super::update::{ALL, Lines, RING, UNREACHED, around, choose, lanes};
-use super::feet::{Feet, TRIANGLES};
-use super::patch::{Lanes, MARGIN, Patch, patch, seen, transpose};
+use super::super::field::{AREA, SIDE, TensorField};
+use super::super::tiles::{ITSELF, Job, NEIGHBOURS, Queue, Values, WINDOW_CELLS, neighbour};
+use super::super::update::{ALL, Block, Lines, choose, lanes};
+use super::feet::{self, BEFORE, BEHIND, Feet};
+use super::strip::Lanes;
+use super::triangle::Triangle;
 use crate::{Control, Result};
 
 /// Sweeps over a tile before it goes back into the queue, and times it may come back.
@@ -19,50 +20,51 @@ const MOST_ACTIVATIONS: u32 = 40;
 
 /// What the transport shares between rounds.
 struct Shared {
-    e: Vec<[f32; AREA]>,
+    e: Board,
     queue: Queue,
     taken: Vec<Job>,
 }
 
 #[derive(Default)]
 struct Outcome {
-    e: Option<Box<[f32; AREA]>>,
     settled: bool,
     changed: bool,
+}
+
+/// The feet of a field's tiles: what the transport follows.
+pub(super) struct Ways<'a> {
+    pub(super) feet: &'a [Feet],
+    /// Neighbours that each tile reads, one bit each as in [`RING`](super::super::update::RING).
+    pub(super) reads: &'a [u8],
+    /// Least distance of each tile, and the tiles in order of it.
+    pub(super) keys: &'a [f32],
+    pub(super) order: &'a [u32],
 }
 
 /// Solves `e = (1−θ) e(a) + θ e(b) + ρ`, tiles in the order of their least distance.
 pub(super) fn carry(
     field: &TensorField,
-    values: &[[f32; AREA]],
-    feet: &[Feet],
+    &Ways { feet, reads, keys, order }: &Ways<'_>,
     tolerance: f32,
     control: &Control,
 ) -> Result<Vec<[f32; AREA]>> {
     let tiling = field.tiling;
     let tiles = tiling.tiles();
-    let least = |tile: &[f32; AREA]| tile.iter().copied().fold(f32::INFINITY, f32::min);
-    let keys: Vec<f32> = values.par_iter().map(least).collect();
-    let mut order: Vec<u32> = (0..tiles as u32).filter(|&t| keys[t as usize] < UNREACHED).collect();
-    order.sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
-    let mut order = order.into_iter().peekable();
+    let mut order = order.iter().copied().peekable();
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
-    let shared =
-        Shared { e: vec![[0.0; AREA]; tiles], queue: Queue::new(tiles), taken: Vec::new() };
+    let e = Board::new(Values { tiling, tiles: vec![[0.0; AREA]; tiles] });
+    let shared = Shared { e, queue: Queue::new(tiles), taken: Vec::new() };
     let work = |_: &mut (), shared: &Shared, index: usize| {
         let tile = shared.taken[index].tile as usize;
-        carry_tile(&tiling, &feet[tile], &shared.e, tile, tolerance)
+        carry_tile(&feet[tile], &shared.e, tile, tolerance)
     };
     let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| {
         control.check()?;
-        let Shared { e, queue, taken } = shared;
+        let Shared { queue, taken, .. } = shared;
         for (job, outcome) in taken.iter().zip(outcomes) {
             let tile = job.tile as usize;
             activations[tile] += 1;
-            if let Some(new) = &outcome.e {
-                e[tile] = **new;
-            }
             let mut wake = |tile: usize| {
                 if activations[tile] < MOST_ACTIVATIONS {
                     queue.wake(tile, keys[tile], ITSELF);
@@ -74,7 +76,7 @@ pub(super) fn carry(
             if outcome.changed {
                 for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
                     if let Some(n) = neighbour(&tiling, tile, dx, dy)
-                        && feet[n].reads & 1 << ((side + 4) % 8) != 0
+                        && reads[n] & 1 << ((side + 4) % 8) != 0
                     {
                         wake(n);
                     }
@@ -93,108 +95,112 @@ pub(super) fn carry(
         }
         Ok(taken.len())
     };
-    Ok(crew::run(shared, lead, work)?.e)
+    Ok(crew::run(shared, lead, work)?.e.into_values().tiles)
 }
 
 /// Sweeps the correction through a tile until it stands still.
-fn carry_tile(
-    tiling: &Tiling,
-    feet: &Feet,
-    e: &[[f32; AREA]],
-    tile: usize,
-    tolerance: f32,
-) -> Outcome {
-    let mut outcome = Outcome::default();
-    let mut block = patch(tiling, tile, 0.0, |t| &e[t]);
-    // By columns where most comes along the rows, and against the direction it comes from.
-    let turned = (feet.flow[0].abs() > feet.flow[1].abs()).then(|| feet.transposed());
-    let feet = turned.as_ref().unwrap_or(feet);
-    if turned.is_some() {
+fn carry_tile(feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
+    let mut block = [[0.0; SIDE + 2]; SIDE + 2];
+    e.load(tile, &mut block);
+    // Nothing comes from beyond the grid.
+    for value in block.as_flattened_mut() {
+        *value = choose(*value < f32::INFINITY, *value, 0.0);
+    }
+    if feet.by_columns {
         transpose(&mut block);
     }
-    let weights = weights(feet);
-    let mut descending = feet.flow[1] > 0;
+    let mut descending = feet.descending;
     let mut sweeps = 0;
     let mut dirty = ALL;
+    let mut outcome = Outcome::default();
     while dirty != 0 && sweeps < MOST_SWEEPS {
-        dirty = carry_once(&mut block, &weights, &feet.rho, tolerance, descending, dirty);
-        outcome.changed |= dirty != 0;
+        let changed;
+        (dirty, changed) = sweep(&mut block, feet, tolerance, descending, dirty);
+        outcome.changed |= changed;
         descending = !descending;
         sweeps += 1;
     }
     outcome.settled = dirty == 0;
-    if turned.is_some() {
+    if feet.by_columns {
         transpose(&mut block);
     }
-    let mut new = Box::new([0.0; AREA]);
-    for (row, line) in new.chunks_exact_mut(SIDE).enumerate() {
-        line.copy_from_slice(&block[row + MARGIN][MARGIN..MARGIN + SIDE]);
-    }
-    outcome.e = Some(new);
+    e.store(tile, &block);
     outcome
 }
 
-/// Weights of the ring in each node's value, by rows.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn weights(feet: &Feet) -> [[Lanes; 8]; SIDE] {
-    let mut weights = [[[0f32; SIDE]; 8]; SIDE];
-    for (row, weights) in weights.iter_mut().enumerate() {
-        let theta = lanes(&feet.theta, row * SIDE);
-        let mut triangle = [0u8; SIDE];
-        triangle.copy_from_slice(&feet.triangle[row * SIDE..(row + 1) * SIDE]);
-        for t in 0..8 {
-            let (a, b) = TRIANGLES[t];
-            for i in 0..SIDE {
-                let here = triangle[i] == t as u8;
-                weights[a][i] += choose(here, 1.0 - theta[i], 0.0);
-                weights[b][i] += choose(here, theta[i], 0.0);
-            }
+/// Mirrors a block on its diagonal.
+fn transpose(block: &mut Block) {
+    for row in 0..block.len() {
+        for col in 0..row {
+            let value = block[row][col];
+            block[row][col] = block[col][row];
+            block[col][row] = value;
         }
     }
-    weights
 }
 
-/// One sweep over the rows in `dirty`; the rows next to which something changed by more than `tolerance`.
+/// One sweep over the lines in `dirty`; those that read what changed since by more than `tolerance`, and whether
+/// anything did.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn carry_once(
-    block: &mut Patch,
-    weights: &[[[f32; SIDE]; 8]; SIDE],
-    rho: &[f32; AREA],
+fn sweep(
+    block: &mut Block,
+    feet: &Feet,
     tolerance: f32,
     descending: bool,
     mut dirty: Lines,
-) -> Lines {
+) -> (Lines, bool) {
+    let mut any = false;
     for step in 0..SIDE {
         let row = if descending { SIDE - 1 - step } else { step };
         if dirty & 1 << row == 0 {
             continue;
         }
         dirty &= !(1 << row);
-        let mut new = lanes(rho, row * SIDE);
-        for n in 0..8 {
-            let (dx, dy) = RING[n];
-            let e = seen(block, row, dx, dy);
-            for i in 0..SIDE {
-                new[i] += weights[row][n][i] * e[i];
-            }
+        let reads = |line: usize, bit: u32| u32::from(feet.reads[line]) & bit != 0;
+        // A line that reads itself is carried until it stands still before others read it.
+        let most = if reads(row, feet::ITSELF) { SIDE } else { 1 };
+        let changes = (0..most).take_while(|_| carry_line(block, feet, row, tolerance)).count();
+        if changes == 0 {
+            continue;
         }
-        let old = seen(block, row, 0, 0);
-        let mut changed = 0;
-        for i in 0..SIDE {
-            changed |= u32::from((new[i] - old[i]).abs() > tolerance);
+        any = true;
+        if row > 0 && reads(row - 1, BEHIND) {
+            dirty |= 1 << (row - 1);
         }
-        block[row + MARGIN][MARGIN..MARGIN + SIDE].copy_from_slice(&new);
-        if changed != 0 {
-            dirty |= around(row);
+        if row + 1 < SIDE && reads(row + 1, BEFORE) {
+            dirty |= 1 << (row + 1);
+        }
+        if changes == most && most > 1 {
+            dirty |= 1 << row;
         }
     }
-    dirty
+    (dirty, any)
+}
+
+/// Carries the correction to the nodes of a line; whether one changed by more than `tolerance`.
+#[inline(always)]
+fn carry_line(block: &mut Block, feet: &Feet, row: usize, tolerance: f32) -> bool {
+    let [above, here, below] = [&block[row], &block[row + 1], &block[row + 2]];
+    let (e, w, s, n) = (lanes(here, 2), lanes(here, 0), lanes(below, 1), lanes(above, 1));
+    let (se, nw, ne, sw) = (lanes(below, 2), lanes(above, 0), lanes(above, 2), lanes(below, 0));
+    let old = lanes(here, 1);
+    let (theta, rho) = (lanes(&feet.theta, row * SIDE), lanes(&feet.rho, row * SIDE));
+    let mut triangles = [0u8; SIDE];
+    triangles.copy_from_slice(&feet.triangle[row * SIDE..(row + 1) * SIDE]);
+    let mut new: Lanes = [0.0; SIDE];
+    let mut changed = 0;
+    for i in 0..SIDE {
+        let bits = u32::from(triangles[i]);
+        let triangle = Triangle::from_bits(bits);
+        let ring = [e[i], se[i], s[i], sw[i], w[i], nw[i], n[i], ne[i]];
+        let (a, b) = (triangle.axis(ring), triangle.diagonal(ring));
+        new[i] = choose(bits & Triangle::NONE != 0, 0.0, a + theta[i] * (b - a) + rho[i]);
+        changed |= u32::from((new[i] - old[i]).abs() > tolerance);
+    }
+    block[row + 1][1..=SIDE].copy_from_slice(&new);
+    changed != 0
 }

@@ -1,0 +1,75 @@
+//! Tiles side by side with the nodes around them.
+
+use super::super::field::{AREA, SIDE, Tiling};
+use super::super::tiles::neighbour;
+use super::super::update::{RING, lanes};
+
+/// A value of each node of a row of a tile.
+pub(super) type Lanes = [f32; SIDE];
+
+/// Nodes around the tiles that the functional looks at.
+pub(super) const MARGIN: usize = 2;
+const HIGH: usize = SIDE + 2 * MARGIN;
+
+pub(super) const WIDE: usize = STRIP * SIDE + 2 * MARGIN;
+/// Most tiles of a strip: what is looked at around so many fits into the nearest cache.
+pub(super) const STRIP: usize = 4;
+pub(super) type Strip = [[f32; WIDE]; HIGH];
+
+/// Fills a strip with `tiles` tiles from `first` on and the nodes around them, `outside` beyond the grid.
+pub(super) fn fill<'a>(
+    strip: &mut Strip,
+    tiling: &Tiling,
+    (first, tiles): (usize, usize),
+    outside: f32,
+    values: impl Fn(usize) -> &'a [f32; AREA],
+) {
+    *strip = [[outside; WIDE]; HIGH];
+    let rows = [(-1, SIDE - MARGIN..SIDE, 0), (0, 0..SIDE, MARGIN), (1, 0..MARGIN, MARGIN + SIDE)];
+    for (dy, from, to) in rows {
+        for k in 0..tiles + 2 {
+            let Some(tile) = neighbour(tiling, first, k as isize - 1, dy) else { continue };
+            let lines = values(tile).as_chunks::<SIDE>().0[from.clone()].iter();
+            let lines = lines.zip(&mut strip[to..]);
+            if k == 0 {
+                lines.for_each(|(line, to)| to[..MARGIN].copy_from_slice(&line[SIDE - MARGIN..]));
+            } else if k <= tiles {
+                let at = MARGIN + (k - 1) * SIDE;
+                lines.for_each(|(line, to)| to[at..at + SIDE].copy_from_slice(line));
+            } else {
+                let at = MARGIN + tiles * SIDE;
+                lines.for_each(|(line, to)| to[at..at + MARGIN].copy_from_slice(&line[..MARGIN]));
+            }
+        }
+    }
+}
+
+/// The values `(dx, dy)` from the nodes of a row of the tile that begins at column `from`.
+#[inline(always)]
+pub(super) fn seen(strip: &Strip, (from, row): (usize, usize), (dx, dy): (i32, i32)) -> Lanes {
+    let line = &strip[(row as i32 + dy + MARGIN as i32) as usize];
+    lanes(line, (from as i32 + dx + MARGIN as i32) as usize)
+}
+
+/// The values around the nodes of a row, in the order of [`RING`].
+#[inline(always)]
+pub(super) fn around(strip: &Strip, at: (usize, usize)) -> [Lanes; 8] {
+    // Not `array::map`: what is not inlined here is not compiled for the wide registers.
+    let [e, se, s, sw, w, nw, n, ne] = RING;
+    [
+        seen(strip, at, e),
+        seen(strip, at, se),
+        seen(strip, at, s),
+        seen(strip, at, sw),
+        seen(strip, at, w),
+        seen(strip, at, nw),
+        seen(strip, at, n),
+        seen(strip, at, ne),
+    ]
+}
+
+/// The values around node `i` of a row.
+#[inline(always)]
+pub(super) fn around_node([e, se, s, sw, w, nw, n, ne]: &[Lanes; 8], i: usize) -> [f32; 8] {
+    [e[i], se[i], s[i], sw[i], w[i], nw[i], n[i], ne[i]]
+}
