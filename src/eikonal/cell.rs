@@ -14,9 +14,8 @@ impl DistanceMap {
         let mut best: Option<(f64, DVec2, f64)> = None;
         for (a, b) in self.borders(at) {
             let (pa, pb) = (point(a), point(b));
-            let ga = self.stored(a.0, a.1) + self.shift(at, pa);
-            let gb = self.stored(b.0, b.1) + self.shift(at, pb);
-            let ends = [(pa, ga, self.is_reached(a.0, a.1)), (pb, gb, self.is_reached(b.0, b.1))];
+            let value_of = |(c, r)| Some(self.reached(c, r)? + self.shift(at, point((c, r))));
+            let (ga, gb) = (value_of(a), value_of(b));
             let mut offer = |to: DVec2, g: f64| {
                 let sum = g + metric.norm(to - at);
                 if to.distance(at) > MIN_STEP
@@ -28,12 +27,12 @@ impl DistanceMap {
                     best = Some((sum, to, g));
                 }
             };
-            if ends[0].2 && ends[1].2 {
+            if let (Some(ga), Some(gb)) = (ga, gb) {
                 let (_, theta) = segment(ga, pa - at, gb, pb - at, metric);
                 offer(pa.lerp(pb, theta), ga + theta * (gb - ga));
             }
-            for (p, g, reached) in ends {
-                if reached {
+            for (p, g) in [(pa, ga), (pb, gb)] {
+                if let Some(g) = g {
                     offer(p, g);
                 }
             }
@@ -45,20 +44,18 @@ impl DistanceMap {
     pub(crate) fn lowest_corner(&self, at: DVec2) -> Option<(DVec2, f64)> {
         self.borders(at)
             .flat_map(|(a, b)| [a, b])
-            .filter(|&(c, r)| self.is_reached(c, r))
-            .map(|node| (point(node), self.stored(node.0, node.1)))
+            .filter_map(|(c, r)| Some((point((c, r)), self.reached(c, r)?)))
             .filter(|&(p, _)| p != at && sees(&self.field, at, p))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Sides of the cells that touch `at`, without those it lies on.
-    fn borders(&self, at: DVec2) -> impl Iterator<Item = ((usize, usize), (usize, usize))> + '_ {
-        let first = |x: f64| (x - 1e-9).floor().max(0.0) as usize;
-        let last =
-            |x: f64, count: usize| ((x + 1e-9).floor() as usize).min(count.saturating_sub(2));
-        let (cols, rows) = (self.cols(), self.rows());
-        let cells = (first(at.y)..=last(at.y, rows))
-            .flat_map(move |row| (first(at.x)..=last(at.x, cols)).map(move |col| (col, row)));
+    fn borders(&self, at: DVec2) -> impl Iterator<Item = ((isize, isize), (isize, isize))> + '_ {
+        let tiling = &self.field.tiling;
+        let span =
+            |axis: usize| tiling.span(axis, (at[axis] - 1e-9).floor(), (at[axis] + 1e-9).floor());
+        let (cols, rows) = (span(0), span(1));
+        let cells = rows.flat_map(move |row| cols.clone().map(move |col| (col, row)));
         cells
             .flat_map(|(c, r)| {
                 [
@@ -68,7 +65,7 @@ impl DistanceMap {
                     ((c, r + 1), (c, r)),
                 ]
             })
-            .filter(move |&(a, b)| a.0.max(b.0) < cols && a.1.max(b.1) < rows)
+            .filter(move |&(a, b)| [a, b].iter().all(|&(c, r)| tiling.node(c, r).is_some()))
             .filter(move |&(a, b)| {
                 let (p, q) = (point(a), point(b));
                 (q - p).perp_dot(at - p).abs() > 1e-9
@@ -79,6 +76,6 @@ impl DistanceMap {
 /// Steps shorter than this, in cells, are no progress.
 const MIN_STEP: f64 = 1e-6;
 
-fn point((col, row): (usize, usize)) -> DVec2 {
+fn point((col, row): (isize, isize)) -> DVec2 {
     DVec2::new(col as f64, row as f64)
 }

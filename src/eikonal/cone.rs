@@ -17,7 +17,7 @@ use glam::DVec2;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::field::{SIDE, TensorField, TensorTile};
+use super::field::{SIDE, TensorField, TensorTile, Tiling};
 use super::source::{POINT_RADIUS, StartRegion};
 use super::update::{RING, choose, greatest, lanes, least};
 use crate::Sym2;
@@ -107,6 +107,20 @@ impl Cone {
             & (1.0 - trace * most + det * (most * most) >= 0.0)
     }
 
+    /// Its images around a periodic grid whose discs touch the nodes; of more than three in a direction, the middle ones.
+    fn images(self, tiling: &Tiling) -> impl Iterator<Item = Self> {
+        let period = DVec2::new(tiling.cols as f64, tiling.rows as f64);
+        let reach = period.min(DVec2::splat(self.radius));
+        let turns = tiling.turns(self.at, -reach, period - 1.0 + reach);
+        turns.map(move |turn| Self { at: self.at + turn, ..self })
+    }
+
+    /// Whether both are the same function `g0`.
+    fn is(&self, other: &Self) -> bool {
+        let near = self.at.abs_diff_eq(other.at, 1e-9);
+        near && self.metric == other.metric && self.sides == other.sides
+    }
+
     /// Whether `v` from the point leads into the fan: the point is then the nearest of the start region.
     pub(crate) fn holds(&self, v: DVec2) -> bool {
         let mv = self.metric.apply(v);
@@ -144,11 +158,10 @@ impl Cones {
                 .filter_map(|(at, sides)| Cone::new(field, at, sides, travelled))
                 .collect::<Vec<_>>()
         };
-        let last = DVec2::new(field.cols() as f64, field.rows() as f64) - 1.0;
-        // Nothing fans out from a corner outside the grid: no way leads there.
-        let inside = |cone: &Cone| cone.at.cmpge(DVec2::ZERO).all() && cone.at.cmple(last).all();
-        let mut cones: Vec<Cone> = starts.iter().flat_map(of_start).filter(inside).collect();
         let tiling = field.tiling;
+        // Nothing fans out from a corner outside the grid: no way leads there.
+        let inside = |cone: &Cone| tiling.contains(cone.at);
+        let mut cones: Vec<Cone> = starts.iter().flat_map(of_start).filter(inside).collect();
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
         if cones.is_empty() || cones.len() > MOST_CONES || radius < POINT_RADIUS {
             return Self::default();
@@ -157,8 +170,11 @@ impl Cones {
         let share = (tiling.cols * tiling.rows) as f64 / cones.len() as f64;
         for cone in &mut cones {
             cone.radius = radius;
-            cone.alike = cone.alike(field, radius.min(0.5 * share.sqrt()));
+            let most = radius.min(0.5 * share.sqrt());
+            let alike = cone.images(&tiling).map(|image| image.alike(field, most));
+            cone.alike = alike.fold(most, f64::min);
         }
+        let cones: Vec<Cone> = cones.into_iter().flat_map(|cone| cone.images(&tiling)).collect();
         let of_tile =
             (0..tiling.tiles()).into_par_iter().map(|tile| nearest(&cones, field, tile)).collect();
         Self { cones, of_tile }
@@ -174,16 +190,19 @@ impl Cones {
         self.cones.get(index as usize)
     }
 
-    /// The cone that is taken out at all the given nodes.
+    /// The cone that is taken out at all the given nodes, seen from there.
     pub(crate) fn around(
         &self,
         field: &TensorField,
-        nodes: impl IntoIterator<Item = (usize, usize)>,
-    ) -> Option<&Cone> {
-        let mut found: Option<&Cone> = None;
+        nodes: impl IntoIterator<Item = (isize, isize)>,
+    ) -> Option<Cone> {
+        let mut found: Option<Cone> = None;
         for (col, row) in nodes {
-            let (cone, ..) = self.at_node(field, col, row)?;
-            if found.is_some_and(|found| !std::ptr::eq(found, cone)) {
+            let (c, r) = field.tiling.node(col, row)?;
+            let (&cone, ..) = self.at_node(field, c, r)?;
+            let turn = DVec2::new((col - c as isize) as f64, (row - r as isize) as f64);
+            let cone = Cone { at: cone.at + turn, ..cone };
+            if found.is_some_and(|found| !found.is(&cone)) {
                 return None;
             }
             found = Some(cone);
@@ -227,7 +246,8 @@ impl Cones {
 /// The cone that brings the least distance to the middle of a tile under its own metric, if it reaches into the tile, as for
 /// [`Cones::of_tile`]. Where a far one does, a nearer one that it beats must not be taken out.
 fn nearest(cones: &[Cone], field: &TensorField, tile: usize) -> u32 {
-    let half = 0.5 * (SIDE - 1) as f64;
+    let [cols, rows] = field.tiling.size(tile);
+    let half = 0.5 * (DVec2::new(cols as f64, rows as f64) - 1.0);
     let middle = field.tiling.first(tile) + half;
     let length = |cone: &Cone| cone.travelled + cone.value(middle - cone.at);
     let nearest = cones.iter().enumerate().min_by(|a, b| length(a.1).total_cmp(&length(b.1)));

@@ -1,5 +1,7 @@
 //! Speed tensors on the nodes, in the solver's own units, tile by tile.
 
+use std::ops::Range;
+
 use glam::DVec2;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -34,11 +36,17 @@ pub(crate) struct Tiling {
     pub(crate) rows: usize,
     pub(crate) across: usize,
     pub(crate) down: usize,
+    /// Whether the first column comes again after the last, and the first row.
+    pub(crate) periodic: [bool; 2],
 }
+
+/// Coordinates in a periodic direction are less than this: beyond, an `f64` would not tell the points of a cell apart.
+const FAR: f64 = 1e12;
 
 impl Tiling {
     pub(crate) fn new(cols: usize, rows: usize) -> Self {
-        Self { cols, rows, across: cols.div_ceil(SIDE), down: rows.div_ceil(SIDE) }
+        let (across, down) = (cols.div_ceil(SIDE), rows.div_ceil(SIDE));
+        Self { cols, rows, across, down, periodic: [false; 2] }
     }
 
     pub(crate) fn tiles(&self) -> usize {
@@ -50,17 +58,73 @@ impl Tiling {
         DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64
     }
 
+    /// Columns and rows of a tile.
+    pub(crate) fn size(&self, tile: usize) -> [usize; 2] {
+        let (x, y) = (tile % self.across, tile / self.across);
+        [SIDE.min(self.cols - x * SIDE), SIDE.min(self.rows - y * SIDE)]
+    }
+
     /// Tile and place in it of a node.
     pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
         ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)
+    }
+
+    /// The node that is found at a column and a row, counted on around the grid where it is periodic; `None` outside.
+    pub(crate) fn node(&self, col: isize, row: isize) -> Option<(usize, usize)> {
+        let wrap = |at: isize, count: usize, periodic: bool| match usize::try_from(at) {
+            Ok(at) if at < count => Some(at),
+            _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
+        };
+        let [across, down] = self.periodic;
+        Some((wrap(col, self.cols, across)?, wrap(row, self.rows, down)?))
+    }
+
+    /// Least and greatest coordinates of points on the grid.
+    pub(crate) fn bounds(&self) -> (DVec2, DVec2) {
+        let [across, down] = self.periodic;
+        let least = DVec2::new(if across { -FAR } else { 0.0 }, if down { -FAR } else { 0.0 });
+        let last = DVec2::new(self.cols as f64, self.rows as f64) - 1.0;
+        (least, DVec2::select(least.cmplt(DVec2::ZERO), -least, last))
+    }
+
+    pub(crate) fn contains(&self, at: DVec2) -> bool {
+        let (least, most) = self.bounds();
+        at.cmpge(least).all() && at.cmple(most).all()
+    }
+
+    /// Columns (`axis` 0) or rows (1) of the grid between two coordinates.
+    pub(crate) fn span(&self, axis: usize, from: f64, to: f64) -> Range<isize> {
+        let (least, most) = self.bounds();
+        from.max(least[axis]).ceil() as isize..to.min(most[axis]).floor() as isize + 1
+    }
+
+    /// What to add to a point to come to its images between `least` and `most`; in a direction that is not periodic there is
+    /// only the point itself.
+    pub(crate) fn turns(
+        &self,
+        at: DVec2,
+        least: DVec2,
+        most: DVec2,
+    ) -> impl Iterator<Item = DVec2> + use<> {
+        let period = DVec2::new(self.cols as f64, self.rows as f64);
+        let (first, last) = ((least - at) / period, (most - at) / period);
+        let periodic = self.periodic;
+        let along = move |axis: usize| match periodic[axis] {
+            true => first[axis].ceil() as isize..=last[axis].floor() as isize,
+            false => 0..=0,
+        };
+        let turn = move |i: isize, j: isize| DVec2::new(i as f64, j as f64) * period;
+        along(1).flat_map(move |j| along(0).map(move |i| turn(i, j)))
     }
 }
 
 /// The speed tensors of a grid in index coordinates (column, row; spacing 1), divided by a power of four
 /// so that typical entries are near 1 and `f32` never overflows, whatever the unit of the terrain.
+///
+/// The parameters of a closed surface go round: see [`periodic`](Self::periodic).
 #[derive(Clone, Debug)]
 pub struct TensorField {
-    pub(super) tiling: Tiling,
+    pub(crate) tiling: Tiling,
     pub(super) tiles: Vec<TensorTile>,
     /// `D = scale · stored`, so distance is stored distance divided by [`root_scale`](Self::root_scale).
     root_scale: f64,
@@ -104,6 +168,26 @@ impl TensorField {
             }
         };
         Self::build(cols, rows, &vec![DVec2::ONE; rows], sample, control)
+    }
+
+    /// The same field on a grid that closes on itself in the columns, the rows or both, as the parameters of a cylinder or a
+    /// torus do: where `directions` says so, after the last node comes the first again, one step on.
+    ///
+    /// A coordinate in such a direction may be any number; those a whole turn apart (the number of columns or of rows) mean the
+    /// same place. A line or an area of a start that crosses the seam goes on beyond the grid.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there are fewer than 3 nodes in a periodic direction.
+    pub fn periodic(mut self, directions: [bool; 2]) -> Result<Self> {
+        for (periodic, count) in directions.into_iter().zip([self.cols(), self.rows()]) {
+            if periodic && count < 3 {
+                return Err(Error::usage(format!(
+                    "a periodic direction of {count} nodes; it must have 3 or more"
+                )));
+            }
+        }
+        self.tiling.periodic = directions;
+        Ok(self)
     }
 
     /// The field of the tensors that `sample` gives for the block whose first node is `(col, row)`, once the
@@ -195,19 +279,19 @@ impl TensorField {
 
     /// Whether all corners of the cell around a point are open that its bilinear value depends on.
     pub(super) fn is_open_around(&self, at: DVec2) -> bool {
-        let ends = |x: f64| [x.floor().max(0.0) as usize, x.ceil().max(0.0) as usize];
-        ends(at.y).iter().all(|&row| {
-            ends(at.x)
-                .iter()
-                .all(|&col| col < self.cols() && row < self.rows() && self.is_open(col, row))
-        })
+        let ends = |x: f64| [x.floor() as isize, x.ceil() as isize];
+        let open = |col, row| self.tiling.node(col, row).is_some_and(|(c, r)| self.is_open(c, r));
+        ends(at.y).iter().all(|&row| ends(at.x).iter().all(|&col| open(col, row)))
     }
 
     /// Stored metric at grid coordinates: bilinear over the open corners of the cell; `None` if all are closed.
     pub(crate) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
-        let corner =
-            |value: f64, count: usize| (value.floor() as usize).min(count.saturating_sub(2));
-        let (col, row) = (corner(at.x, self.cols()), corner(at.y, self.rows()));
+        let corner = |axis: usize, count: usize| {
+            let corner = at[axis].floor() as isize;
+            let last = count.saturating_sub(2) as isize;
+            if self.tiling.periodic[axis] { corner } else { corner.clamp(0, last) }
+        };
+        let (col, row) = (corner(0, self.cols()), corner(1, self.rows()));
         let (u, v) = (at.x - col as f64, at.y - row as f64);
         let mut sum = Sym2::default();
         let mut weight = 0.0;
@@ -217,9 +301,8 @@ impl TensorField {
             (0, 1, (1.0 - u) * v),
             (1, 1, u * v),
         ] {
-            if col + i < self.cols()
-                && row + j < self.rows()
-                && let Some(metric) = self.metric(col + i, row + j)
+            if let Some((c, r)) = self.tiling.node(col + i, row + j)
+                && let Some(metric) = self.metric(c, r)
             {
                 // A trace of weight for every open corner, so that a point on a closed one has a metric too.
                 let w = w + 1e-9;

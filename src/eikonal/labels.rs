@@ -66,9 +66,7 @@ impl DistanceMap {
         // The foot lies between it and the end beyond.
         let far = near + (foot - near).signum() * (foot - near).abs().ceil();
         let ends = [near, far].map(|step| {
-            let col = col.checked_add_signed(step.x as isize).filter(|&col| col < self.cols());
-            let row = row.checked_add_signed(step.y as isize).filter(|&row| row < self.rows());
-            col.zip(row)
+            self.field.tiling.node(col as isize + step.x as isize, row as isize + step.y as isize)
         });
         let lower = |&(c, r): &(usize, usize)| self.stored(c, r) < self.stored(col, row);
         // Beside a cone taken out both may be higher; the nearer one still leads there.

@@ -23,7 +23,7 @@ mod update;
 
 use glam::DVec2;
 
-use self::cone::Cones;
+use self::cone::{Cone, Cones};
 pub use self::field::TensorField;
 use self::field::{AREA, TensorTile};
 use self::source::Seeds;
@@ -258,6 +258,9 @@ impl DistanceMap {
     /// reached, bilinear in a cell with four reached corners, and the solver's own update beside walls.
     #[must_use]
     pub fn at(&self, at: DVec2) -> Option<f64> {
+        if !self.field.tiling.contains(at) {
+            return None;
+        }
         let value = match (self.straight(at), self.cubic(at)) {
             (Some((_, length)), Some(value)) => length.min(value),
             (None, Some(value)) => value,
@@ -299,7 +302,7 @@ impl DistanceMap {
     #[must_use]
     pub fn direction(&self, col: usize, row: usize) -> Option<DVec2> {
         let spacing = self.frame.as_ref().map_or(DVec2::ONE, |frame| frame.spacing(row as f64));
-        let foot = self.foot(col, row)?;
+        let foot = self.foot(col as isize, row as isize)?;
         (DVec2::new(-foot.x, foot.y) * spacing).try_normalize()
     }
 
@@ -311,13 +314,19 @@ impl DistanceMap {
         self.values.get(col, row) < UNREACHED
     }
 
-    /// Step in grid coordinates from a node to the point of its ring that its value came from.
-    pub(crate) fn foot(&self, col: usize, row: usize) -> Option<DVec2> {
-        if !self.is_reached(col, row) {
-            return None;
-        }
+    /// Stored value at a node, counted on around the grid where it is periodic; `None` outside and where not reached.
+    pub(crate) fn reached(&self, col: isize, row: isize) -> Option<f64> {
+        let (col, row) = self.field.tiling.node(col, row)?;
+        self.is_reached(col, row).then(|| self.stored(col, row))
+    }
+
+    /// Step in grid coordinates from a node, as in [`reached`](Self::reached), to the point of its ring that its value came
+    /// from.
+    pub(crate) fn foot(&self, col: isize, row: isize) -> Option<DVec2> {
+        let value = self.reached(col, row)?;
+        let (col, row) = self.field.tiling.node(col, row)?;
         let node = DVec2::new(col as f64, row as f64);
-        if let Some(foot) = self.straight_home(node, self.stored(col, row)) {
+        if let Some(foot) = self.straight_home(node, value) {
             return Some(foot - node);
         }
         best_foot(&self.field, &self.cones, &self.values, col, row).map(|(_, foot)| foot)
@@ -338,25 +347,23 @@ impl DistanceMap {
     /// where it leaves what the corners of the cell span, at a kink.
     fn cubic(&self, at: DVec2) -> Option<f64> {
         let (col, row) = (at.x.floor(), at.y.floor());
-        let last = DVec2::new(self.cols() as f64, self.rows() as f64) - 3.0;
-        if !(col >= 1.0 && row >= 1.0 && col <= last.x && row <= last.y) {
-            return None;
-        }
-        let (x, y) = (col as usize, row as usize);
-        let nodes = || (0..4).flat_map(|j| (0..4).map(move |i| (i, j)));
-        let place = |i: usize, j: usize| (x + i - 1, y + j - 1);
-        if nodes().any(|(i, j)| !self.is_reached(place(i, j).0, place(i, j).1)) {
-            return None;
+        let nodes = || (0..16).map(|k| (k % 4, k / 4));
+        let place =
+            |i: usize, j: usize| (col as isize + i as isize - 1, row as isize + j as isize - 1);
+        let mut w = [[0.0; 4]; 4];
+        for (i, j) in nodes() {
+            let (c, r) = place(i, j);
+            w[j][i] = self.reached(c, r)?;
         }
         let cone = self.cones.around(&self.field, nodes().map(|(i, j)| place(i, j)));
         let g0 = |at: DVec2| cone.map_or(0.0, |cone| cone.value(at - cone.at));
-        let w = |i: usize, j: usize| {
+        for (i, j) in nodes() {
             let (c, r) = place(i, j);
-            self.stored(c, r) - g0(DVec2::new(c as f64, r as f64))
-        };
+            w[j][i] -= g0(DVec2::new(c as f64, r as f64));
+        }
         let (u, v) = (keys(at.x - col), keys(at.y - row));
-        let value: f64 = nodes().map(|(i, j)| u[i] * v[j] * w(i, j)).sum();
-        let corners = [w(1, 1), w(2, 1), w(1, 2), w(2, 2)];
+        let value: f64 = nodes().map(|(i, j)| u[i] * v[j] * w[j][i]).sum();
+        let corners = [w[1][1], w[1][2], w[2][1], w[2][2]];
         let (least, most) = corners
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &w| (a.min(w), b.max(w)));
@@ -366,24 +373,22 @@ impl DistanceMap {
 
     /// The point of the start that the cone around `at` comes from, if nothing is in the way.
     pub(crate) fn centre_in_sight(&self, at: DVec2) -> Option<DVec2> {
-        let (col, row) = (at.x.round() as usize, at.y.round() as usize);
-        let (cone, ..) = self.cones.at_node(&self.field, col, row)?;
+        let cone = self.cone_around(at)?;
         sees(&self.field, at, cone.at).then_some(cone.at)
     }
 
     /// How much the cone around `at` lowers the value read at `to`, see [`mod@cone`].
     fn shift(&self, at: DVec2, to: DVec2) -> f64 {
-        let (col, row) = (at.x.round() as usize, at.y.round() as usize);
-        let cone = self.cones.at_node(&self.field, col, row);
-        cone.map_or(0.0, |(cone, ..)| cone.shift(at - cone.at, to - at))
+        self.cone_around(at).map_or(0.0, |cone| cone.shift(at - cone.at, to - at))
+    }
+
+    /// The cone at the node nearest to `at`.
+    fn cone_around(&self, at: DVec2) -> Option<Cone> {
+        self.cones.around(&self.field, [(at.x.round() as isize, at.y.round() as isize)])
     }
 
     pub(crate) fn stored_at(&self, at: DVec2) -> Option<f64> {
-        let outside = at.x < 0.0
-            || at.y < 0.0
-            || at.x > (self.cols() - 1) as f64
-            || at.y > (self.rows() - 1) as f64;
-        if outside || !at.is_finite() {
+        if !self.field.tiling.contains(at) {
             return None;
         }
         let straight = self.straight(at).map(|(_, length)| length).into_iter();
@@ -392,7 +397,7 @@ impl DistanceMap {
 
     /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.
     fn interpolated(&self, at: DVec2) -> Option<f64> {
-        let (col, row) = (at.x as usize, at.y as usize);
+        let (col, row) = (at.x.floor() as isize, at.y.floor() as isize);
         let (u, v) = (at.x - col as f64, at.y - row as f64);
         let corners = [
             (0, 0, (1.0 - u) * (1.0 - v)),
@@ -403,8 +408,8 @@ impl DistanceMap {
         let used = || {
             corners.iter().filter(|corner| corner.2 > 0.0).map(|&(i, j, w)| (col + i, row + j, w))
         };
-        if used().all(|(c, r, _)| self.is_reached(c, r)) {
-            let linear: f64 = used().map(|(c, r, w)| w * self.stored(c, r)).sum();
+        let linear: Option<f64> = used().map(|(c, r, w)| self.reached(c, r).map(|g| w * g)).sum();
+        if let Some(linear) = linear {
             // Only what is smooth is interpolated.
             let bent = self.cones.around(&self.field, used().map(|(c, r, _)| (c, r))).map(|cone| {
                 let g0 = |at: DVec2| cone.value(at - cone.at);
@@ -415,8 +420,7 @@ impl DistanceMap {
         }
         let metric = self.field.metric_at(at)?;
         used()
-            .filter(|&(c, r, _)| self.is_reached(c, r))
-            .map(|(c, r, _)| (DVec2::new(c as f64, r as f64), self.stored(c, r)))
+            .filter_map(|(c, r, _)| Some((DVec2::new(c as f64, r as f64), self.reached(c, r)?)))
             .filter(|&(node, _)| source::sees(&self.field, at, node))
             .map(|(node, value)| value + metric.norm(node - at))
             .min_by(f64::total_cmp)
@@ -450,11 +454,8 @@ fn best_foot(
 ) -> Option<(f64, DVec2)> {
     let metric = field.metric(col, row)?;
     let ring = RING.map(|(i, j)| {
-        let (c, r) = (col.checked_add_signed(i as isize), row.checked_add_signed(j as isize));
-        match (c, r) {
-            (Some(c), Some(r)) if c < field.cols() && r < field.rows() => values.get(c, r),
-            _ => f32::INFINITY,
-        }
+        let node = field.tiling.node(col as isize + i as isize, row as isize + j as isize);
+        node.map_or(f32::INFINITY, |(c, r)| values.get(c, r))
     });
     let shifts = cones.shifts(field, col, row);
     let mut best: Option<(f64, DVec2)> = None;

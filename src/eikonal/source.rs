@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::cone::Cone;
-use super::field::{AREA, TensorField};
+use super::field::{AREA, TensorField, Tiling};
 use super::update::{UNREACHED, segment};
 use crate::{Error, Result, Sym2};
 
@@ -49,7 +49,7 @@ pub(super) fn seed_all(
 ) -> Result<()> {
     let mut seeds = 0;
     for (start, region) in starts.iter().zip(0..) {
-        start.check()?;
+        start.check(&field.tiling)?;
         if field.tiling.tiles() == 0 {
             break;
         }
@@ -106,18 +106,29 @@ impl StartRegion {
         Self { value, ..self }
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self, tiling: &Tiling) -> Result<()> {
+        /// So many times around the grid a region may reach in a periodic direction.
+        const MOST_TURNS: f64 = 64.0;
         if !(self.value.is_finite() && self.value >= 0.0) {
             return Err(Error::usage(format!(
                 "the value of a start region is {}; it must be 0 or more",
                 self.value
             )));
         }
-        let points = self.points.iter().chain(self.lines.iter().flatten());
-        match points.chain(self.areas.iter().flatten().flatten()).find(|at| !at.is_finite()) {
+        let far = MOST_TURNS * DVec2::new(tiling.cols as f64, tiling.rows as f64);
+        let bad = |at: &DVec2| {
+            let [across, down] = tiling.periodic;
+            !at.is_finite() || (across && at.x.abs() > far.x) || (down && at.y.abs() > far.y)
+        };
+        match self.vertices().find(bad) {
             Some(at) => Err(Error::usage(format!("the start {at} is no place on the grid"))),
             None => Ok(()),
         }
+    }
+
+    fn vertices(&self) -> impl Iterator<Item = DVec2> + '_ {
+        let points = self.points.iter().chain(self.lines.iter().flatten());
+        points.chain(self.areas.iter().flatten().flatten()).copied()
     }
 
     /// Whether there is nothing in it.
@@ -185,8 +196,20 @@ impl StartRegion {
     }
 
     /// The point of the region that a traveller at `at`, nearer than `radius` cells, can go to in a straight
-    /// line, and the region's value with the length of that (stored units); the shortest of them.
+    /// line, and the region's value with the length of that (stored units); the shortest of them. In periodic directions
+    /// that of the nearest image of the region.
     fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
+        let far = DVec2::INFINITY;
+        let (least, most) = self.vertices().fold((far, -far), |(a, b), p| (a.min(p), b.max(p)));
+        let turns = field.tiling.turns(at, least - radius, most + radius);
+        let feet = turns.filter_map(|turn| {
+            let (foot, length) = self.own_foot(field, at + turn, radius)?;
+            Some((foot - turn, length))
+        });
+        feet.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    fn own_foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
         let travelled = self.value * field.root_scale();
         if self.covers(at) {
             return Some((at, travelled));
@@ -229,7 +252,7 @@ fn closed_segments(ring: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ 
     (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]))
 }
 
-/// Open nodes within `radius` cells of the segment, each with its nearest point on it.
+/// Open nodes within `radius` cells of the segment, each with its place beside it and its nearest point on it.
 fn near(
     field: &TensorField,
     a: DVec2,
@@ -237,18 +260,15 @@ fn near(
     radius: f64,
     mut visit: impl FnMut(usize, usize, DVec2, DVec2),
 ) {
-    let span = |lo: f64, hi: f64, count: usize| {
-        let first = (lo - radius).ceil().max(0.0) as usize;
-        let last = (hi + radius).floor().min(count as f64 - 1.0);
-        first..(last + 1.0).max(0.0) as usize
-    };
-    for row in span(a.y.min(b.y), a.y.max(b.y), field.rows()) {
-        for col in span(a.x.min(b.x), a.x.max(b.x), field.cols()) {
+    let (least, most) = (a.min(b) - radius, a.max(b) + radius);
+    for row in field.tiling.span(1, least.y, most.y) {
+        for col in field.tiling.span(0, least.x, most.x) {
+            let Some((c, r)) = field.tiling.node(col, row) else { continue };
             let node = DVec2::new(col as f64, row as f64);
             let (_, theta) = segment(0.0, a - node, 0.0, b - node, Sym2::new(1.0, 0.0, 1.0));
             let nearest = a.lerp(b, theta);
-            if nearest.distance(node) <= radius && field.is_open(col, row) {
-                visit(col, row, node, nearest);
+            if nearest.distance(node) <= radius && field.is_open(c, r) {
+                visit(c, r, node, nearest);
             }
         }
     }
@@ -256,7 +276,10 @@ fn near(
 
 /// Open nodes inside the rings by the even-odd rule, row by row between the crossings of their segments.
 fn inside(field: &TensorField, rings: &[Vec<DVec2>], mut visit: impl FnMut(usize, usize)) {
-    for row in 0..field.rows() {
+    let heights = rings.iter().flatten().map(|at| at.y);
+    let (north, south) =
+        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)));
+    for row in field.tiling.span(1, north, south) {
         let y = row as f64;
         let segments = rings.iter().flat_map(|ring| closed_segments(ring));
         let mut crossings: Vec<f64> = segments
@@ -266,13 +289,12 @@ fn inside(field: &TensorField, rings: &[Vec<DVec2>], mut visit: impl FnMut(usize
             .collect();
         crossings.sort_unstable_by(f64::total_cmp);
         for ends in crossings.chunks_exact(2) {
-            let last = ends[1].min((field.cols() - 1) as f64);
-            let mut col = ends[0].ceil().max(0.0);
-            while col <= last {
-                if field.is_open(col as usize, row) {
-                    visit(col as usize, row);
+            for col in field.tiling.span(0, ends[0], ends[1]) {
+                if let Some((c, r)) = field.tiling.node(col, row)
+                    && field.is_open(c, r)
+                {
+                    visit(c, r);
                 }
-                col += 1.0;
             }
         }
     }
@@ -309,10 +331,9 @@ fn geodesic(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
         energy += weight / 12.0 * field.metric_at(a + v * (i as f64 / 4.0))?.form(v);
     }
     let middle = a.midpoint(b);
-    let last = DVec2::new((field.cols() - 1) as f64, (field.rows() - 1) as f64);
+    let (least, most) = field.tiling.bounds();
     let slope = |by: DVec2| {
-        let (before, after) =
-            ((middle - by).clamp(DVec2::ZERO, last), (middle + by).clamp(DVec2::ZERO, last));
+        let (before, after) = ((middle - by).clamp(least, most), (middle + by).clamp(least, most));
         let length = (after - before).length();
         // Beside walls there is no telling; there the chord has to do.
         if length > 0.0 && field.is_open_around(before) && field.is_open_around(after) {
@@ -334,9 +355,9 @@ pub(crate) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
     let steps = (a.distance(b) * DENSITY).ceil().max(1.0);
     (0..=steps as usize).all(|i| {
         let p = a.lerp(b, i as f64 / steps);
-        let (col, row) = (p.x.floor().max(0.0) as usize, p.y.floor().max(0.0) as usize);
-        let open = |i: usize, j: usize| {
-            col + i >= field.cols() || row + j >= field.rows() || field.is_open(col + i, row + j)
+        let (col, row) = (p.x.floor() as isize, p.y.floor() as isize);
+        let open = |i: isize, j: isize| {
+            field.tiling.node(col + i, row + j).is_none_or(|(c, r)| field.is_open(c, r))
         };
         let corners = [open(0, 0), open(1, 0), open(0, 1), open(1, 1)];
         corners == [true; 4] || on_free_side(corners, p - p.floor(), a, b, p.floor())

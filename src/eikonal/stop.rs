@@ -87,17 +87,15 @@ impl Standing<'_> {
     /// Whether the open corners of the goal's cell, and what their values come from, are final; `None` if there are none.
     fn is_settled(&self, goal: DVec2) -> Option<bool> {
         let field = self.field;
-        let (col, row) = (goal.x.max(0.0), goal.y.max(0.0));
-        let (west, east) = (col.floor() as usize, col.ceil() as usize);
-        let (north, south) = (row.floor() as usize, row.ceil() as usize);
+        let (west, east) = (goal.x.floor() as isize, goal.x.ceil() as isize);
+        let (north, south) = (goal.y.floor() as isize, goal.y.ceil() as isize);
         let corners = [(west, north), (east, north), (west, south), (east, south)];
-        let open =
-            |&(c, r): &(usize, usize)| c < field.cols() && r < field.rows() && field.is_open(c, r);
+        let node = |(c, r)| field.tiling.node(c, r).filter(|&(c, r)| field.is_open(c, r));
         let settled = |(c, r): (usize, usize)| {
             let (tile, place) = field.tiling.place(c, r);
             self.board.at(tile, place) + self.limits[tile].longest_step < self.news
         };
-        let settled = corners.into_iter().filter(open).map(settled);
+        let settled = corners.into_iter().filter_map(node).map(settled);
         settled.fold(None, |all, corner| Some(all.unwrap_or(true) && corner))
     }
 }

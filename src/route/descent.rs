@@ -69,15 +69,14 @@ fn direction(distance: &DistanceMap, at: DVec2) -> Option<DVec2> {
 }
 
 /// The cell of a point, if the point is inside the grid and all corners that matter are reached.
-fn clear_cell(distance: &DistanceMap, at: DVec2) -> Option<(usize, usize)> {
-    let last = DVec2::new((distance.cols() - 1) as f64, (distance.rows() - 1) as f64);
-    if !(at.cmpge(DVec2::ZERO).all() && at.cmple(last).all()) {
+fn clear_cell(distance: &DistanceMap, at: DVec2) -> Option<(isize, isize)> {
+    if !distance.field.tiling.contains(at) {
         return None;
     }
-    let (col, row) = (at.x as usize, at.y as usize);
+    let (col, row) = (at.x.floor() as isize, at.y.floor() as isize);
     let (east, south) = (at.x > col as f64, at.y > row as f64);
     let reached =
-        |i: bool, j: bool| distance.is_reached(col + usize::from(i), row + usize::from(j));
+        |i: bool, j: bool| distance.reached(col + isize::from(i), row + isize::from(j)).is_some();
     let clear = reached(false, false)
         && (!east || reached(true, false))
         && (!south || reached(false, true))
@@ -88,7 +87,7 @@ fn clear_cell(distance: &DistanceMap, at: DVec2) -> Option<(usize, usize)> {
 /// From a node to the point its value came from; from elsewhere to the lowest corner in sight.
 fn descend_to_node(distance: &DistanceMap, at: DVec2) -> Option<(DVec2, f64)> {
     if at == at.round() {
-        let next = at + distance.foot(at.x as usize, at.y as usize)?;
+        let next = at + distance.foot(at.x as isize, at.y as isize)?;
         return Some((next, distance.stored_at(next)?));
     }
     distance.lowest_corner(at)
