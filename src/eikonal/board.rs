@@ -42,6 +42,9 @@ impl Board {
 
     /// A tile and the nodes around it; infinite outside the grid.
     pub(super) fn load(&self, tile: usize, block: &mut Block) {
+        if self.tiling.is_over_seam(tile, 1, 1) {
+            return self.load_over_seam(tile, block);
+        }
         let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
         for (j, line) in block.iter_mut().enumerate() {
             // Row and column of the block, counted in nodes from the tile before the first.
@@ -63,10 +66,21 @@ impl Board {
         }
     }
 
-    /// Puts a solved tile back.
+    /// [`load`](Self::load) node by node.
+    fn load_over_seam(&self, tile: usize, block: &mut Block) {
+        for (row, line) in (-1..).zip(block) {
+            for (col, value) in (-1..).zip(line) {
+                let place = self.tiling.seen_from(tile, col, row);
+                *value = place.map_or(f32::INFINITY, |(tile, place)| self.at(tile, place));
+            }
+        }
+    }
+
+    /// Puts a solved tile back, without what is beyond the grid.
     pub(super) fn store(&self, tile: usize, block: &Block) {
-        for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..]) {
-            for (bits, value) in line.iter().zip(&solved[1..=SIDE]) {
+        let [cols, rows] = self.tiling.size(tile);
+        for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..=rows]) {
+            for (bits, value) in line.iter().zip(&solved[1..=cols]) {
                 bits.store(value.to_bits(), Relaxed);
             }
         }

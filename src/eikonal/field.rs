@@ -71,12 +71,28 @@ impl Tiling {
 
     /// The node that is found at a column and a row, counted on around the grid where it is periodic; `None` outside.
     pub(crate) fn node(&self, col: isize, row: isize) -> Option<(usize, usize)> {
-        let wrap = |at: isize, count: usize, periodic: bool| match usize::try_from(at) {
-            Ok(at) if at < count => Some(at),
-            _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
-        };
         let [across, down] = self.periodic;
         Some((wrap(col, self.cols, across)?, wrap(row, self.rows, down)?))
+    }
+
+    /// Whether the nodes within `margin` of `count` tiles side by side lie over the seam of a periodic direction.
+    pub(crate) fn is_over_seam(&self, tile: usize, count: usize, margin: usize) -> bool {
+        let over =
+            |at: usize, tiles: usize, count: usize| at == 0 || (at + tiles) * SIDE + margin > count;
+        let [across, down] = self.periodic;
+        across && over(tile % self.across, count, self.cols)
+            || down && over(tile / self.across, 1, self.rows)
+    }
+
+    /// Tile and place in it of the node at a column and a row counted from the first of a tile; `None` outside.
+    ///
+    /// The last tile of a periodic direction may be wider than what is left of the grid. The places beyond are closed
+    /// and never updated, but seen from the tile they are the first nodes of the next turn, for their neighbours to
+    /// read.
+    pub(crate) fn seen_from(&self, tile: usize, col: isize, row: isize) -> Option<(usize, usize)> {
+        let (x, y) = (tile % self.across, tile / self.across);
+        let (col, row) = self.node((x * SIDE) as isize + col, (y * SIDE) as isize + row)?;
+        Some(self.place(col, row))
     }
 
     /// Least and greatest coordinates of points on the grid.
@@ -115,6 +131,14 @@ impl Tiling {
         };
         let turn = move |i: isize, j: isize| DVec2::new(i as f64, j as f64) * period;
         along(1).flat_map(move |j| along(0).map(move |i| turn(i, j)))
+    }
+}
+
+/// The place of `at` among `count`, counted on around them if they are periodic.
+pub(super) fn wrap(at: isize, count: usize, periodic: bool) -> Option<usize> {
+    match usize::try_from(at) {
+        Ok(at) if at < count => Some(at),
+        _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
     }
 }
 

@@ -1,5 +1,7 @@
 //! The solver against closed forms and against the slow reference.
 
+mod periodic;
+
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;

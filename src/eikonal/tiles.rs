@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::board::Board;
 use super::cone::Cones;
 use super::crew;
-use super::field::{AREA, SIDE, TensorField, Tiling};
+use super::field::{AREA, SIDE, TensorField, Tiling, wrap};
 use super::source::Seeds;
 use super::stop::{self, Standing, Stop};
 use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Rule, Tile, UNREACHED};
@@ -108,15 +108,14 @@ pub(super) const NEIGHBOURS: [(isize, isize); 8] = {
 };
 pub(super) const ITSELF: usize = 8;
 
-/// The rows and the columns of a tile next to the given sides. A corner is in the row.
-fn lines_beside(sides: u16) -> [Lines; 2] {
-    const LAST: Lines = 1 << (SIDE - 1);
-    let line = |at: isize| if at > 0 { LAST } else { 1 };
+/// The rows and the columns of a tile of a size next to the given sides. A corner is in the row.
+fn lines_beside(sides: u16, [width, height]: [usize; 2]) -> [Lines; 2] {
+    let line = |at: isize, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
     (0..SIDES.len()).filter(|side| sides & 1 << side != 0).fold([0; 2], |[rows, cols], side| {
         match SIDES[side] {
             (0, 0) => [ALL, cols],
-            (dx, 0) => [rows, cols | line(dx)],
-            (_, dy) => [rows | line(dy), cols],
+            (dx, 0) => [rows, cols | line(dx, width)],
+            (_, dy) => [rows | line(dy, height), cols],
         }
     })
 }
@@ -223,9 +222,11 @@ pub(super) struct Job {
     first: u8,
 }
 
+/// The tile `(dx, dy)` from another.
 pub(super) fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize> {
-    let x = (tile % tiling.across).checked_add_signed(dx).filter(|&x| x < tiling.across)?;
-    let y = (tile / tiling.across).checked_add_signed(dy).filter(|&y| y < tiling.down)?;
+    let [across, down] = tiling.periodic;
+    let x = wrap((tile % tiling.across) as isize + dx, tiling.across, across)?;
+    let y = wrap((tile / tiling.across) as isize + dy, tiling.down, down)?;
     Some(y * tiling.across + x)
 }
 
@@ -436,7 +437,7 @@ fn solve_tile(
     let mut descending = [dy > 0, dx > 0];
     let mut by_columns = dx != 0 && dy == 0;
     // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
-    let mut owed = lines_beside(job.sides);
+    let mut owed = lines_beside(job.sides, tiling.size(tile));
     let mut changes = [0; 2];
     let mut changed = false;
     let mut outcome = Outcome::default();
@@ -462,7 +463,7 @@ fn solve_tile(
                 .flat_map(|line| &line[1..=SIDE])
                 .fold(f32::INFINITY, |least, &value| least.min(value));
         }
-        outcome.wakes = wakes(tiling, shared, tile, block);
+        outcome.wakes = wakes(tiling, shared, tile, &outcome.limits, block);
         shared.board.store(tile, block);
     }
     outcome
@@ -470,46 +471,67 @@ fn solve_tile(
 
 /// The least changed values that could improve, or supported, a neighbour. A node `x` can be improved by a neighbour `y`
 /// only if `g(y) < g(x) + slack`.
-fn wakes(tiling: &Tiling, shared: &Shared, tile: usize, block: &Block) -> [f32; 8] {
-    const LAST: usize = SIDE - 1;
+fn wakes(
+    tiling: &Tiling,
+    shared: &Shared,
+    tile: usize,
+    limits: &Limits,
+    block: &Block,
+) -> [f32; 8] {
+    let [cols, rows] = tiling.size(tile);
+    let (east, south) = (cols - 1, rows - 1);
     // News at the borders, with one place before and after.
     let news = |col: usize, row: usize| {
         let (old, new) = (shared.board.at(tile, row * SIDE + col), block[row + 1][col + 1]);
         if (old - new).abs() > ROUNDING * new { old.min(new) } else { f32::INFINITY }
     };
     let slack = |(dx, dy): (isize, isize)| {
-        neighbour(tiling, tile, dx, dy).map_or(0.0, |n| shared.queue.limits[n].slack)
+        let Some(n) = neighbour(tiling, tile, dx, dy) else { return 0.0 };
+        let slack = shared.queue.limits[n].slack;
+        // A periodic direction may be one tile wide.
+        if n == tile { slack.max(limits.slack + limits.shift) } else { slack }
     };
     let improves = |new: f32, old: f32, slack: f32| {
         if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }
     };
-    let side = |k: usize, line: [(usize, usize); SIDE], ring: [(usize, usize); SIDE]| {
-        let slack = slack(NEIGHBOURS[k]);
-        let mut padded = [f32::INFINITY; SIDE + 2];
-        for (news_at, &(col, row)) in padded[1..].iter_mut().zip(&line) {
-            *news_at = news(col, row);
-        }
-        let mut key = f32::INFINITY;
-        for i in 0..SIDE {
-            let new = padded[i].min(padded[i + 1]).min(padded[i + 2]);
-            let (col, row) = ring[i];
-            key = key.min(improves(new, block[row][col], slack));
-        }
-        key
-    };
+    let side =
+        |k: usize, count: usize, line: [(usize, usize); SIDE], ring: [(usize, usize); SIDE]| {
+            let slack = slack(NEIGHBOURS[k]);
+            let mut padded = [f32::INFINITY; SIDE + 2];
+            for (news_at, &(col, row)) in padded[1..].iter_mut().zip(&line[..count]) {
+                *news_at = news(col, row);
+            }
+            let mut key = f32::INFINITY;
+            for i in 0..count {
+                let new = padded[i].min(padded[i + 1]).min(padded[i + 2]);
+                let (col, row) = ring[i];
+                key = key.min(improves(new, block[row][col], slack));
+            }
+            key
+        };
     let corner = |k: usize, col: usize, row: usize| {
         let (dx, dy) = NEIGHBOURS[k];
         let old = block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
         improves(news(col, row), old, slack(NEIGHBOURS[k]))
     };
     [
-        side(0, std::array::from_fn(|i| (LAST, i)), std::array::from_fn(|i| (SIDE + 1, i + 1))),
-        corner(1, LAST, LAST),
-        side(2, std::array::from_fn(|i| (i, LAST)), std::array::from_fn(|i| (i + 1, SIDE + 1))),
-        corner(3, 0, LAST),
-        side(4, std::array::from_fn(|i| (0, i)), std::array::from_fn(|i| (0, i + 1))),
+        side(
+            0,
+            rows,
+            std::array::from_fn(|i| (east, i)),
+            std::array::from_fn(|i| (east + 2, i + 1)),
+        ),
+        corner(1, east, south),
+        side(
+            2,
+            cols,
+            std::array::from_fn(|i| (i, south)),
+            std::array::from_fn(|i| (i + 1, south + 2)),
+        ),
+        corner(3, 0, south),
+        side(4, rows, std::array::from_fn(|i| (0, i)), std::array::from_fn(|i| (0, i + 1))),
         corner(5, 0, 0),
-        side(6, std::array::from_fn(|i| (i, 0)), std::array::from_fn(|i| (i + 1, 0))),
-        corner(7, LAST, 0),
+        side(6, cols, std::array::from_fn(|i| (i, 0)), std::array::from_fn(|i| (i + 1, 0))),
+        corner(7, east, 0),
     ]
 }
