@@ -88,10 +88,11 @@ impl Surroundings {
         invert(&mut self.metric);
         for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {
             let tile = first + k;
+            let size = tiling.size(tile);
             let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
             let seeds = input.seeds[tile].as_deref();
             let tile = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
-            *reads = find(self, k * SIDE, &tile, feet);
+            *reads = find(self, k * SIDE, &tile, size, feet);
         }
     }
 }
@@ -162,13 +163,19 @@ fn rises<const N: usize>(
     rises
 }
 
-/// Finds the feet of the tile that begins at column `from`; the neighbours that it reads.
+/// Finds the feet of the tile of a size that begins at column `from`; the neighbours that it reads.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
     "x86_64+sse4.1",
 ))]
-fn find(around: &Surroundings, from: usize, tile: &Tile<'_>, feet: &mut Feet) -> u8 {
+fn find(
+    around: &Surroundings,
+    from: usize,
+    tile: &Tile<'_>,
+    size: [usize; 2],
+    feet: &mut Feet,
+) -> u8 {
     let mut course = Course::default();
     for row in 0..SIDE {
         if tile.cone.is_some() {
@@ -177,7 +184,7 @@ fn find(around: &Surroundings, from: usize, tile: &Tile<'_>, feet: &mut Feet) ->
             find_line::<false>(around, (from, row), tile, feet, &mut course);
         }
     }
-    course.set(feet)
+    course.set(feet, size)
 }
 
 /// Finds the feet of a row of a tile.
@@ -207,6 +214,7 @@ fn find_line<const IN_CONE: bool>(
     let (xx, xy, yy) = (seen(xx, at, own), seen(xy, at, own), seen(yy, at, own));
     let (g, det) = (seen(g, at, own), seen(det, at, own));
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
+    let dets = lanes(&tile.tensors.det, row * SIDE);
     let (mut triangles, mut thetas, mut rhos) = ([0u32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
         let ring = around_node(&ring, i);
@@ -243,7 +251,8 @@ fn find_line<const IN_CONE: bool>(
             ),
         };
         let (theta, rho) = foot.minimise::<IN_CONE>();
-        let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED);
+        // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
+        let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
         triangles[i] = if fixed { Triangle::NONE } else { bits };
         thetas[i] = choose(fixed, 0.0, theta);
         rhos[i] = choose(fixed, 0.0, rho);
@@ -318,13 +327,13 @@ impl Course {
 
     /// Sets the feet's way of being swept; the neighbouring tiles that they read.
     #[inline(always)]
-    fn set(&self, feet: &mut Feet) -> u8 {
+    fn set(&self, feet: &mut Feet, size: [usize; 2]) -> u8 {
         let mut cols = [0u8; SIDE];
         for i in 0..SIDE {
             cols[i] = self.cols[i] as u8;
         }
         let (east, south) = (self.east.iter().sum::<i32>(), self.south.iter().sum::<i32>());
-        let reads = neighbours_read(&feet.triangle, &self.rows, &cols);
+        let reads = neighbours_read(size, &feet.triangle, &self.rows, &cols);
         // By columns where most comes along the rows, and against the direction it comes from.
         feet.by_columns = east.abs() > south.abs();
         if feet.by_columns {
@@ -338,8 +347,13 @@ impl Course {
 }
 
 /// The neighbouring tiles that a tile reads, one bit each as in [`RING`]; perhaps one too many at a corner.
-fn neighbours_read(triangle: &[u8; AREA], rows: &[u8; SIDE], cols: &[u8; SIDE]) -> u8 {
-    const LAST: usize = SIDE - 1;
+fn neighbours_read(
+    [width, height]: [usize; 2],
+    triangle: &[u8; AREA],
+    rows: &[u8; SIDE],
+    cols: &[u8; SIDE],
+) -> u8 {
+    let (east, south) = (width - 1, height - 1);
     let corner = |place: usize, falling: bool, west: bool| {
         let bits = u32::from(triangle[place]);
         let t = Triangle::from_bits(bits);
@@ -347,14 +361,14 @@ fn neighbours_read(triangle: &[u8; AREA], rows: &[u8; SIDE], cols: &[u8; SIDE]) 
         bits != Triangle::NONE && t.falling == falling && to_west == west
     };
     let bits = [
-        u32::from(cols[LAST]) & BEHIND != 0,
-        corner(AREA - 1, false, false),
-        u32::from(rows[LAST]) & BEHIND != 0,
-        corner(AREA - SIDE, true, true),
+        u32::from(cols[east]) & BEHIND != 0,
+        corner(south * SIDE + east, false, false),
+        u32::from(rows[south]) & BEHIND != 0,
+        corner(south * SIDE, true, true),
         u32::from(cols[0]) & BEFORE != 0,
         corner(0, false, true),
         u32::from(rows[0]) & BEFORE != 0,
-        corner(LAST, true, false),
+        corner(east, true, false),
     ];
     bits.into_iter().enumerate().fold(0, |set, (k, bit)| set | u8::from(bit) << k)
 }

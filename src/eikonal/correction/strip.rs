@@ -24,6 +24,9 @@ pub(super) fn fill<'a>(
     outside: f32,
     values: impl Fn(usize) -> &'a [f32; AREA],
 ) {
+    if tiling.is_over_seam(first, tiles, MARGIN) {
+        return fill_over_seam(strip, tiling, first, outside, values);
+    }
     *strip = [[outside; WIDE]; HIGH];
     let rows = [(-1, SIDE - MARGIN..SIDE, 0), (0, 0..SIDE, MARGIN), (1, 0..MARGIN, MARGIN + SIDE)];
     for (dy, from, to) in rows {
@@ -40,6 +43,22 @@ pub(super) fn fill<'a>(
                 let at = MARGIN + tiles * SIDE;
                 lines.for_each(|(line, to)| to[at..at + MARGIN].copy_from_slice(&line[..MARGIN]));
             }
+        }
+    }
+}
+
+/// [`fill`] node by node.
+fn fill_over_seam<'a>(
+    strip: &mut Strip,
+    tiling: &Tiling,
+    first: usize,
+    outside: f32,
+    values: impl Fn(usize) -> &'a [f32; AREA],
+) {
+    for (row, line) in (-(MARGIN as isize)..).zip(strip) {
+        for (col, value) in (-(MARGIN as isize)..).zip(line) {
+            let place = tiling.seen_from(first, col, row);
+            *value = place.map_or(outside, |(tile, place)| values(tile)[place]);
         }
     }
 }

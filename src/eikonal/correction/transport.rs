@@ -198,7 +198,7 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, tolerance: f32) -> boo
         let triangle = Triangle::from_bits(bits);
         let ring = [e[i], se[i], s[i], sw[i], w[i], nw[i], n[i], ne[i]];
         let (a, b) = (triangle.axis(ring), triangle.diagonal(ring));
-        new[i] = choose(bits & Triangle::NONE != 0, 0.0, a + theta[i] * (b - a) + rho[i]);
+        new[i] = choose(bits & Triangle::NONE != 0, old[i], a + theta[i] * (b - a) + rho[i]);
         changed |= u32::from((new[i] - old[i]).abs() > tolerance);
     }
     block[row + 1][1..=SIDE].copy_from_slice(&new);
