@@ -508,7 +508,8 @@ fn wild_start(cols: usize, rows: usize) -> impl Strategy<Value = StartRegion> {
 }
 
 fn wild_problem() -> impl Strategy<Value = (usize, usize, Vec<Option<Sym2>>, Vec<StartRegion>)> {
-    let sizes = [(1, 1), (1, 40), (33, 1), (17, 1), (2, 2), (17, 17), (16, 33), (40, 25), (0, 3)];
+    let sizes =
+        [(1, 1), (1, 40), (33, 1), (17, 1), (2, 2), (17, 17), (16, 33), (40, 25), (3, 30), (0, 3)];
     proptest::sample::select(sizes.to_vec()).prop_flat_map(|(cols, rows)| {
         let tensors = proptest::collection::vec(wild_tensor(), cols * rows);
         let starts = proptest::collection::vec(wild_start(cols, rows), 0..4);
@@ -594,8 +595,10 @@ proptest! {
         stop in any_stop(),
         at in (any_number(-1.0..40.0), any_number(-1.0..40.0)),
         accuracy in prop_oneof![Just(Accuracy::Fast), Just(Accuracy::High)],
+        periodic in any::<[bool; 2]>(),
     ) {
         let f = field(cols, rows, |c, r| tensors[r * cols + c]);
+        let f = f.periodic([periodic[0] && cols > 2, periodic[1] && rows > 2]).unwrap();
         let solver = Solver { accuracy, ..Solver::default() };
         let control = Control::default();
         let Ok(map) = solver.solve_field(f, &starts, &stop, &control) else { return Ok(()) };

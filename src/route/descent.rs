@@ -161,6 +161,31 @@ mod tests {
     }
 
     #[test]
+    fn lines_go_on_over_the_seam_of_a_closed_surface() {
+        let (cols, rows) = (70, 50);
+        let d = Sym2::new(1.0, 0.3, 1.5);
+        let field = TensorField::from_fn(cols, rows, |_, _| Some(d), &Control::default());
+        let field = field.unwrap().periodic([true, true]).unwrap();
+        let period = DVec2::new(cols as f64, rows as f64);
+        let start = DVec2::new(65.3, 46.6);
+        let map = Solver::default()
+            .solve_field(field, &[start.into()], &Stop::Never, &Control::default())
+            .unwrap();
+        for k in 0..40 {
+            // Nearer than any image; the line ends at the image of the start that is near the goal.
+            let home = start + period * DVec2::new(f64::from(k % 5) - 2.0, f64::from(k % 3) - 1.0);
+            let goal = home + 17.0 * DVec2::from_angle(0.157 * f64::from(k));
+            let line = line(&map, goal).unwrap();
+            assert_eq!(line[line.len() - 1], goal);
+            assert!(line[0].distance(home) < 1e-9, "{goal}: {} is not {home}", line[0]);
+            let along = (goal - home).normalize();
+            for (p, q) in line.iter().zip(&line[1..]) {
+                assert!(p.distance(*q) < 1.5 && (*p - home).perp_dot(along).abs() < 0.5, "{p}");
+            }
+        }
+    }
+
+    #[test]
     fn lines_go_round_walls_without_touching_them() {
         // Staggered walls with a gap at alternate ends; one of them is a bare diagonal of nodes.
         let n = 60;
