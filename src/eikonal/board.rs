@@ -76,12 +76,24 @@ impl Board {
         }
     }
 
-    /// Puts a solved tile back, without what is beyond the grid.
+    /// Puts a solved tile back.
     pub(super) fn store(&self, tile: usize, block: &Block) {
-        let [cols, rows] = self.tiling.size(tile);
-        for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..=rows]) {
-            for (bits, value) in line.iter().zip(&solved[1..=cols]) {
+        for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..]) {
+            for (bits, value) in line.iter().zip(&solved[1..=SIDE]) {
                 bits.store(value.to_bits(), Relaxed);
+            }
+        }
+        if self.tiling.is_over_seam(tile, 1, 1) {
+            self.close_beyond(tile);
+        }
+    }
+
+    /// Closes the places of a tile beyond the grid.
+    fn close_beyond(&self, tile: usize) {
+        let [cols, rows] = self.tiling.size(tile);
+        for (row, line) in self.tile(tile).chunks_exact(SIDE).enumerate() {
+            for bits in &line[if row < rows { cols } else { 0 }..] {
+                bits.store(f32::INFINITY.to_bits(), Relaxed);
             }
         }
     }

@@ -437,7 +437,8 @@ fn solve_tile(
     let mut descending = [dy > 0, dx > 0];
     let mut by_columns = dx != 0 && dy == 0;
     // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
-    let mut owed = lines_beside(job.sides, tiling.size(tile));
+    let size = tiling.size(tile);
+    let mut owed = lines_beside(job.sides, size);
     let mut changes = [0; 2];
     let mut changed = false;
     let mut outcome = Outcome::default();
@@ -463,7 +464,7 @@ fn solve_tile(
                 .flat_map(|line| &line[1..=SIDE])
                 .fold(f32::INFINITY, |least, &value| least.min(value));
         }
-        outcome.wakes = wakes(tiling, shared, tile, &outcome.limits, block);
+        outcome.wakes = wakes(tiling, shared, (tile, size), &outcome.limits, block);
         shared.board.store(tile, block);
     }
     outcome
@@ -474,11 +475,10 @@ fn solve_tile(
 fn wakes(
     tiling: &Tiling,
     shared: &Shared,
-    tile: usize,
+    (tile, [cols, rows]): (usize, [usize; 2]),
     limits: &Limits,
     block: &Block,
 ) -> [f32; 8] {
-    let [cols, rows] = tiling.size(tile);
     let (east, south) = (cols - 1, rows - 1);
     // News at the borders, with one place before and after.
     let news = |col: usize, row: usize| {
