@@ -339,7 +339,8 @@ pub(super) fn prepare(
         k.rising[i] = choose(open, rising, f32::INFINITY);
         k.falling[i] = choose(open, falling, f32::INFINITY);
         k.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
-        k.ceiling[i] = f32::INFINITY;
+        // A closed node never changes: at the seam of a periodic grid it stands for one of another tile.
+        k.ceiling[i] = choose(open, f32::INFINITY, f32::NEG_INFINITY);
         let obtuse = greatest(
             greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
             greatest(
@@ -354,7 +355,7 @@ pub(super) fn prepare(
         for i in 0..SIDE {
             let place = if how.by_columns { i * SIDE + line } else { line * SIDE + i };
             let shortest = least(least(k.east[i], k.south[i]), least(k.rising[i], k.falling[i]));
-            k.ceiling[i] = ceiling(seeds[place], shortest);
+            k.ceiling[i] = least(k.ceiling[i], ceiling(seeds[place], shortest));
         }
     }
     for i in 0..SIDE {
