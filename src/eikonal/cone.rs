@@ -49,6 +49,8 @@ pub(crate) struct Cone {
     pub(crate) sides: [DVec2; 2],
     /// Distance at the point, in stored units.
     travelled: f64,
+    /// Number of the point: its images around a periodic grid have the same.
+    number: usize,
     /// In cells from the point: how far the cone is taken out, and how far all ground is alike.
     pub(crate) radius: f64,
     pub(crate) alike: f64,
@@ -62,7 +64,7 @@ impl Cone {
         travelled: f64,
     ) -> Option<Self> {
         let metric = field.metric_at(at)?;
-        Some(Self { at, metric, sides, travelled, radius: 0.0, alike: 0.0 })
+        Some(Self { at, metric, sides, travelled, number: 0, radius: 0.0, alike: 0.0 })
     }
 
     /// Whether the cone is to be taken out at a node of unlike ground: where `M(s) D` has this trace and determinant,
@@ -168,7 +170,8 @@ impl Cones {
         }
         // No more nodes are looked at than there are, however many cones.
         let share = (tiling.cols * tiling.rows) as f64 / cones.len() as f64;
-        for cone in &mut cones {
+        for (number, cone) in cones.iter_mut().enumerate() {
+            cone.number = number;
             cone.radius = radius;
             let most = radius.min(0.5 * share.sqrt());
             let alike = cone.images(&tiling).map(|image| image.alike(field, most));
@@ -243,16 +246,29 @@ impl Cones {
     }
 }
 
-/// The cone that brings the least distance to the middle of a tile under its own metric, if it reaches into the tile, as for
-/// [`Cones::of_tile`]. Where a far one does, a nearer one that it beats must not be taken out.
+/// The cone that brings the least distance to all of a tile under its own metric, if it reaches into the tile, as for
+/// [`Cones::of_tile`]. Where another that is not its image brings less somewhere, none may be taken out: its front would meet
+/// the shifts of a foreign cone, each of which lowers it a little.
 fn nearest(cones: &[Cone], field: &TensorField, tile: usize) -> u32 {
     let [cols, rows] = field.tiling.size(tile);
     let half = 0.5 * (DVec2::new(cols as f64, rows as f64) - 1.0);
     let middle = field.tiling.first(tile) + half;
-    let length = |cone: &Cone| cone.travelled + cone.value(middle - cone.at);
-    let nearest = cones.iter().enumerate().min_by(|a, b| length(a.1).total_cmp(&length(b.1)));
-    let reaches = |cone: &Cone| cone.gap(field, tile).length() <= cone.radius;
-    nearest.filter(|(_, cone)| reaches(cone)).map_or(0, |(index, _)| index as u32 + 1)
+    let nearest_to = |at: DVec2| {
+        let length = |cone: &Cone| cone.travelled + cone.value(at - cone.at);
+        let lengths = cones.iter().map(length).enumerate();
+        lengths.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
+    };
+    let index = nearest_to(middle);
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+    let reaches = cones[index].gap(field, tile).length() <= cones[index].radius;
+    let alone = || {
+        // The places of one cone are convex where all are alike.
+        let corner = |(x, y)| middle + DVec2::new(x, y) * (half + 1.0);
+        let same = |other: usize| cones[other].number == cones[index].number;
+        cones.iter().all(|cone| cone.number == 0)
+            || corners.into_iter().all(|at| same(nearest_to(corner(at))))
+    };
+    if reaches && alone() { index as u32 + 1 } else { 0 }
 }
 
 /// How far the nearest open node of a tile is from the point, in rows or columns, whose ground is not like `metric`; the first
@@ -298,6 +314,7 @@ mod tests {
             radius: 0.0,
             alike: 0.0,
             travelled: 0.0,
+            number: 0,
         };
         for v in [DVec2::new(1.0, 2.0), DVec2::new(-7.0, 3.5), DVec2::new(0.3, -2.0)] {
             for by in RING.map(|(i, j)| DVec2::new(i.into(), j.into())) {

@@ -110,8 +110,8 @@ impl Solver {
         let Solution { mut values, limits, statistics } = solution.ok_or_else(|| {
             Error::usage("the distance does not settle on this metric; its tensors are too extreme")
         })?;
-        let errors = self.correct(&field, &cones, &mut values, &seeds, control)?;
         control.report("solving distance", 1.0);
+        let errors = self.correct(&field, &cones, &mut values, &seeds, control)?;
         Ok(DistanceMap {
             errors,
             field,

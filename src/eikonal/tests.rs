@@ -253,6 +253,37 @@ fn the_default_tolerance_moves_no_value_noticeably() {
 }
 
 #[test]
+fn no_value_beside_crowded_starts_is_too_low() {
+    for ratio in [1.0, 10.0, 100.0, 400.0] {
+        for spacing in [1.5, 3.4, 9.0, 27.0] {
+            let d = rotated(ratio, 0.4);
+            let at = |i: usize, n: usize| {
+                let jitter = DVec2::new((i * 37 % 11) as f64, (i * 53 % 7) as f64) * 0.1;
+                DVec2::new((i % n) as f64, (i / n) as f64) * spacing + jitter + 3.0
+            };
+            let n = (110.0 / spacing) as usize;
+            let points: Vec<DVec2> =
+                (0..(n * n).min(150)).map(|i| at(i * 7 % (n * n), n)).collect();
+            let starts: Vec<StartRegion> = points.iter().map(|&at| at.into()).collect();
+            let f = field(120, 120, |_, _| Some(d));
+            let map = Solver::default()
+                .solve_field(f, &starts, &Stop::Never, &Control::default())
+                .unwrap();
+            for (i, value) in map.to_row_major().into_iter().enumerate() {
+                let node = DVec2::new((i % 120) as f64, (i / 120) as f64);
+                let exact = points.iter().map(|&at| d.inverse().norm(node - at));
+                let exact = exact.fold(f64::INFINITY, f64::min);
+                let low = exact - f64::from(value);
+                // Between two fronts that meet, linear interpolation is too low by a small part of a step.
+                let most = if ratio <= 10.0 { 0.12 * ratio.sqrt() } else { f64::INFINITY };
+                assert!(low < most, "{ratio} {spacing} {node}: {value} {exact}");
+                assert!(value >= 0.0, "{ratio} {spacing} {node}: {value} {exact}");
+            }
+        }
+    }
+}
+
+#[test]
 fn thread_count_changes_no_bit() {
     let tensor = |c: usize, r: usize| {
         let void = (c / 9 + r / 7).is_multiple_of(5) && c % 9 < 6;

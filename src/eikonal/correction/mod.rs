@@ -74,8 +74,11 @@ pub(super) fn correct(
         let ways = Ways { feet: &feet, reads: &reads, keys: &keys, order: &order };
         transport::carry(field, &ways, tolerance * field.mean_step, control)
     };
+    control.report("correcting distance", 0.0);
     let first = round(None, TOLERANCE_CELLS[0])?;
+    control.report("correcting distance", 0.5);
     let mut second = round(Some(&first), TOLERANCE_CELLS[1])?;
+    control.report("correcting distance", 1.0);
     values.par_iter_mut().zip(&first).zip(&mut second).for_each(|((values, first), second)| {
         for i in 0..AREA {
             let total = first[i] + second[i];
