@@ -80,5 +80,7 @@ pub use error::{Error, Result};
 pub use grid::{GridFrame, Ground};
 pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
 pub use route::{Comparison, Route};
-pub use surface::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
+pub use surface::{
+    Degree, FitOptions, HeightJet, HeightSurface, ParametricSurface, Smoothing, SurfaceJet,
+};
 pub use terrain::{Crs, Terrain};
