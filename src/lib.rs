@@ -78,9 +78,10 @@ pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion, Stop};
 pub use error::{Error, Result};
 pub use grid::{GridFrame, Ground};
-pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
+pub use metric::{Delta, Metric, MetricField, Modifiers, SurfaceMetric, Sym2};
 pub use route::{Comparison, Route};
 pub use surface::{
-    Degree, FitOptions, HeightJet, HeightSurface, ParametricSurface, Smoothing, SurfaceJet,
+    Degree, FitOptions, HeightJet, HeightSurface, Knots, NurbsCurve, NurbsGrid, NurbsSurface,
+    ParametricSurface, Smoothing, SurfaceJet,
 };
 pub use terrain::{Crs, Terrain};

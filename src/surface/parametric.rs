@@ -1,6 +1,7 @@
 //! Surfaces in space over a grid of parameters.
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::{HeightJet, HeightSurface};
 use crate::Sym2;
@@ -37,6 +38,43 @@ pub trait ParametricSurface: Sync {
     fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
         (0..self.cols()).map(|col| self.space_jet(DVec2::new(col as f64, row as f64))).collect()
     }
+
+    /// Area, m², and root mean square of the principal curvatures over it, `√(∫ (κ1² + κ2²)/2 dA / ∫ dA)` in 1/m, from the
+    /// nodes by the trapezoidal rule.
+    fn measures(&self) -> Measures {
+        area_and_curvature(self)
+    }
+}
+
+/// See [`ParametricSurface::measures`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measures {
+    /// Area of the surface, m².
+    pub area: f64,
+    /// Root mean square of the principal curvatures, 1/m.
+    pub rms_curvature: f64,
+}
+
+fn area_and_curvature(surface: &(impl ParametricSurface + ?Sized)) -> Measures {
+    let counts = [surface.cols(), surface.rows()];
+    let share = |axis: usize, at: usize| {
+        let is_end = at == 0 || at + 1 == counts[axis];
+        if is_end && !surface.periodic()[axis] { 0.5 } else { 1.0 }
+    };
+    let of_row = |row: usize| {
+        let jets = surface.row_space_jets(row).into_iter().enumerate();
+        let known = jets.filter(|(col, jet)| jet.is_regular() && !surface.is_void(*col, row));
+        known.fold([0.0; 2], |[area, square], (col, jet)| {
+            let piece = share(0, col) * share(1, row) * jet.area();
+            [area + piece, square + piece * jet.squared_curvature()]
+        })
+    };
+    let rows: Vec<[f64; 2]> = (0..counts[1]).into_par_iter().map(of_row).collect();
+    // Added row by row, so that the sum does not depend on the number of threads.
+    let [area, square] =
+        rows.iter().fold([0.0; 2], |[a, s], [area, square]| [a + area, s + square]);
+    let mean = if area > 0.0 { 0.5 * square / area } else { 0.0 };
+    Measures { area, rms_curvature: mean.sqrt() }
 }
 
 /// A point of a surface and the derivatives there by the two parameters.
@@ -73,6 +111,29 @@ impl SurfaceJet {
         Sym2::new(xx, xy, yy)
     }
 
+    /// Whether the surface has a tangent plane there: `S_1` and `S_2` are neither 0 nor parallel, but for rounding.
+    #[must_use]
+    pub fn is_regular(&self) -> bool {
+        let [a, b] = self.first;
+        let area = self.area();
+        area > 1e-9 * a.length() * b.length() && area.is_finite()
+    }
+
+    /// Mean curvature `H = tr(G⁻¹B)/2`, 1/m, and Gaussian curvature `K = det B/det G`, 1/m².
+    #[must_use]
+    pub fn mean_and_gaussian(&self) -> [f64; 2] {
+        let (g, b) = (self.first_form(), self.second_form());
+        let det = self.area().powi(2);
+        let trace = g.yy * b.xx - 2.0 * g.xy * b.xy + g.xx * b.yy;
+        [0.5 * trace / det, b.det() / det]
+    }
+
+    /// `κ1² + κ2² = 4H² − 2K`, 1/m².
+    fn squared_curvature(&self) -> f64 {
+        let [mean, gaussian] = self.mean_and_gaussian();
+        4.0 * mean * mean - 2.0 * gaussian
+    }
+
     /// Area of the surface per unit of the parameters, `√det G`.
     #[must_use]
     pub fn area(&self) -> f64 {
@@ -97,6 +158,12 @@ impl ParametricSurface for HeightSurface {
 
     fn space_jet(&self, at: DVec2) -> SurfaceJet {
         self.on_ground(at, &self.jet(at))
+    }
+
+    /// The means are those of [`rms_curvature`](Self::rms_curvature), over the map.
+    fn measures(&self) -> Measures {
+        let area = area_and_curvature(self).area;
+        Measures { area, rms_curvature: self.rms_curvature() }
     }
 
     fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
