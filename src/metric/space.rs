@@ -75,7 +75,7 @@ impl<'a> SurfaceMetric<'a> {
     /// void or where the surface is degenerate are closed. Takes 24 bytes per node while it works.
     ///
     /// # Errors
-    /// Cancelled.
+    /// [`Error::Usage`](crate::Error::Usage) for a closed direction of fewer than 3 nodes; cancelled.
     pub fn sample(&self, control: &Control) -> Result<TensorField> {
         let (cols, rows) = (self.surface.cols(), self.surface.rows());
         let speeds: Vec<Vec<Sym2>> = (0..rows)
@@ -97,7 +97,7 @@ impl<'a> SurfaceMetric<'a> {
             let speed = speeds[row][col];
             (!self.surface.is_void(col, row) && speed.is_positive_definite()).then_some(speed)
         };
-        TensorField::from_fn(cols, rows, speed, control)
+        TensorField::from_fn(cols, rows, speed, control)?.periodic(self.surface.periodic())
     }
 
     /// Length under this metric of a polyline in grid coordinates, as [`MetricField::length`](super::MetricField::length); `NaN` if it
