@@ -9,9 +9,10 @@ mod shapes;
 
 use std::path::PathBuf;
 
-use glam::DVec3;
-use ridgeway::render::{Gradient, SurfacePicture, beside, png};
-use ridgeway::{Delta, Metric};
+use glam::{DVec2, DVec3};
+use ridgeway::export::{isolines, levels_by_step};
+use ridgeway::render::{Gradient, Rgb, SurfacePicture, beside, png};
+use ridgeway::{Delta, GridFrame, Ground, Metric};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     for metric in [Metric::Isotropic, Metric::Curvature(Delta::default())] {
@@ -30,10 +31,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for ((surface, map), title) in
         compared.surfaces.iter().zip(&compared.maps).zip(["as made", "reweighted"])
     {
-        let colours = Gradient::Sequential.colours(&map.to_row_major());
+        let values = map.to_row_major();
+        let colours = Gradient::Sequential.colours(&values);
         let mut picture = SurfacePicture::new(surface, &colours);
         (picture.view, picture.max_side_px) = (DVec3::new(-1.0, 2.0, 1.0), 1000);
         picture.title = format!("Knight, {title}");
+        // Rings of nodes in white, to show the parameters, and isolines.
+        let (cols, rows) = (map.cols(), map.rows());
+        for row in (0..rows).step_by(10) {
+            let ring = (0..=cols).map(|col| DVec2::new(col as f64, row as f64)).collect();
+            picture.lines.push((ring, Rgb::WHITE));
+        }
+        let frame = GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES)?;
+        for isoline in isolines(&frame, &values, &levels_by_step(&values, 0.5)?)? {
+            picture.lines.extend(isoline.lines.into_iter().map(|line| (line, Rgb::INK)));
+        }
         pictures.push(picture.render()?);
     }
     std::fs::create_dir_all(&folder)?;

@@ -10,6 +10,7 @@ use ridgeway::{
 };
 
 const DELTA: f64 = 0.3;
+const RADIUS: f64 = 2.0;
 
 fn curvature(surface: &NurbsGrid) -> SurfaceMetric<'_> {
     Metric::Curvature(Delta::Absolute(DELTA)).on_surface(surface).unwrap()
@@ -48,8 +49,8 @@ fn check_order(name: &str, errors: [[f64; 2]; 3], least: [f64; 2], most_at_last:
     assert!(errors[2][0] < most_at_last, "{name}");
 }
 
-/// A circle of radius `r` about a point on the x axis in the plane of x and z, downwards on the outside.
-fn sphere(radius: f64) -> NurbsSurface {
+/// A sphere about the origin from pole to pole.
+fn sphere() -> NurbsSurface {
     let half = [
         [0.0, 1.0, 1.0],
         [1.0, 1.0, FRAC_1_SQRT_2],
@@ -57,42 +58,52 @@ fn sphere(radius: f64) -> NurbsSurface {
         [1.0, -1.0, FRAC_1_SQRT_2],
         [0.0, -1.0, 1.0],
     ];
-    let points = half.map(|[x, z, w]| DVec4::new(radius * x, 0.0, radius * z, w));
+    let points = half.map(|[x, z, w]| DVec4::new(RADIUS * x, 0.0, RADIUS * z, w));
     let knots = Knots::new(2, vec![0.0, 0.0, 0.0, 0.5, 0.5, 1.0, 1.0, 1.0]).unwrap();
     let profile = NurbsCurve::new(knots, false, &points).unwrap();
     NurbsSurface::revolve(&profile, DVec3::ZERO, DVec3::Z).unwrap()
 }
 
+/// Errors of the distances from `start` (a share of the grid) on a sphere under the curvature metric: the angle times `R/√s`,
+/// `s = 1/(δ + 1/R)`.
+fn sphere_errors(sphere: &NurbsSurface, start: DVec2, accuracy: Accuracy, n: usize) -> [f64; 2] {
+    let surface = sphere.clone().on_grid(2 * n, n + 1).unwrap();
+    let start = start * DVec2::new(2.0, 1.0) * n as f64;
+    let map = solve(&curvature(&surface), start, accuracy);
+    // The jet at a pole is not quite that of the pole.
+    let from = if start.y == 0.0 { DVec3::Z } else { surface.space_jet(start).point.normalize() };
+    let per_radian = RADIUS * (DELTA + 1.0 / RADIUS).sqrt();
+    errors(&surface, &map, |p| from.cross(p).length().atan2(from.dot(p)) * per_radian)
+}
+
 #[test]
 fn great_circles_on_a_sphere_through_its_poles() {
-    let radius = 2.0;
-    // The distance is the angle times R/√s, s = 1/(δ + 1/R).
-    let per_radian = radius * (DELTA + 1.0 / radius).sqrt();
-    for (name, row) in
-        [("pole", 0.0), ("beside the pole", 0.05), ("middle", 0.37), ("equator", 0.5)]
-    {
+    let starts = [("pole", 0.0), ("beside the pole", 0.05), ("middle", 0.37), ("equator", 0.5)];
+    for (name, row) in starts {
         for (accuracy, least, most) in
-            [(Accuracy::Fast, [0.8, 0.5], 2e-3), (Accuracy::High, [0.9, 0.5], 1e-3)]
+            [(Accuracy::Fast, [0.9, 0.65], 1e-3), (Accuracy::High, [1.2, 0.5], 6e-5)]
         {
-            let of = |n: usize| {
-                let surface = sphere(radius).on_grid(2 * n, n + 1).unwrap();
-                let start = DVec2::new(0.3 * n as f64, row * n as f64);
-                let from =
-                    if row == 0.0 { DVec3::Z * radius } else { surface.space_jet(start).point };
-                let map = solve(&curvature(&surface), start, accuracy);
-                let exact = |p: DVec3| {
-                    let angle = from.cross(p).length().atan2(from.dot(p));
-                    per_radian * angle
-                };
-                errors(&surface, &map, exact)
-            };
-            check_order(
-                &format!("sphere, {name}, {accuracy:?}"),
-                [50, 100, 200].map(of),
-                least,
-                most,
-            );
+            let of = |n| sphere_errors(&sphere(), DVec2::new(0.15, row), accuracy, n);
+            let name = format!("sphere, {name}, {accuracy:?}");
+            check_order(&name, [50, 100, 200].map(of), least, most);
         }
+    }
+}
+
+#[test]
+fn a_sphere_on_other_parameters_is_the_same() {
+    let along = sphere().reweighted(1, 0.4).unwrap();
+    // At the seam the parameters of this one have a jump, which is of first order.
+    let around = sphere().reweighted(0, 1.5).unwrap();
+    for (name, sphere, accuracy, least, most) in [
+        ("along", &along, Accuracy::Fast, [0.9, 0.65], 2e-3),
+        ("along", &along, Accuracy::High, [1.8, 0.5], 2e-5),
+        ("around", &around, Accuracy::Fast, [0.9, 0.65], 2e-3),
+        ("around", &around, Accuracy::High, [0.9, 0.65], 3e-4),
+    ] {
+        let of = |n| sphere_errors(sphere, DVec2::new(0.15, 0.6), accuracy, n);
+        let name = format!("reweighted {name}, {accuracy:?}");
+        check_order(&name, [50, 100, 200].map(of), least, most);
     }
 }
 
@@ -102,7 +113,7 @@ fn helices_on_a_closed_cylinder() {
     let cylinder = NurbsSurface::ruled(&ring(2.0), &ring(-2.0)).unwrap();
     let [s1, s2] = [1.0 / (DELTA + 1.0), 1.0 / DELTA];
     for (accuracy, least, most) in
-        [(Accuracy::Fast, [0.9, 0.8], 2e-3), (Accuracy::High, [1.0, 0.8], 1e-3)]
+        [(Accuracy::Fast, [0.9, 0.8], 3e-4), (Accuracy::High, [1.8, 1.7], 1e-5)]
     {
         let of = |n: usize| {
             let surface = cylinder.clone().on_grid(2 * n, n + 1).unwrap();
@@ -122,7 +133,6 @@ fn helices_on_a_closed_cylinder() {
 
 #[test]
 fn planes_of_any_parameters_are_flat() {
-    // A cone over a skew polygon would bend; straight lines between two lines in a plane do not.
     let points = |from: DVec3, to: DVec3| NurbsCurve::polyline(&[from, to]).unwrap();
     let normal = DVec3::new(0.3, -0.5, 1.0);
     let at = |x: f64, y: f64| DVec3::new(x, y, -(normal.x * x + normal.y * y));
@@ -140,7 +150,7 @@ fn planes_of_any_parameters_are_flat() {
         let from = surface.space_jet(start).point;
         errors(&surface, &map, |p| p.distance(from) * DELTA.sqrt())
     };
-    check_order("plane", [50, 100, 200].map(of), [0.9, 0.9], 2e-3);
+    check_order("plane", [50, 100, 200].map(of), [0.9, 0.9], 1e-3);
 }
 
 #[test]
@@ -179,7 +189,7 @@ fn a_torus_is_closed_both_ways_and_symmetric() {
 
 #[test]
 fn routes_are_great_circles_across_seams_and_poles() {
-    let surface = sphere(2.0).on_grid(160, 81).unwrap();
+    let surface = sphere().on_grid(160, 81).unwrap();
     let metric = Metric::Isotropic.on_surface(&surface).unwrap();
     let start = DVec2::new(150.0, 20.0);
     let map = solve(&metric, start, Accuracy::Fast);
@@ -196,7 +206,7 @@ fn routes_are_great_circles_across_seams_and_poles() {
             route.points[0].distance(from) < 1e-9
                 && route.points[route.points.len() - 1].distance(to) < 1e-9
         );
-        let exact = 2.0 * from.angle_between(to);
+        let exact = RADIUS * from.angle_between(to);
         let normal = from.cross(to).normalize();
         let stray = route.points.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
         println!("{goal}: {} for {exact}, {stray} m aside", route.cost);
@@ -208,7 +218,7 @@ fn routes_are_great_circles_across_seams_and_poles() {
 
 #[test]
 fn threads_change_no_bit() {
-    let surface = sphere(2.0).on_grid(90, 61).unwrap();
+    let surface = sphere().on_grid(90, 61).unwrap();
     let of = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {

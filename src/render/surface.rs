@@ -10,7 +10,7 @@ use super::text;
 use crate::{Error, ParametricSurface, Result};
 
 /// Share of the light that is everywhere.
-const AMBIENT: f64 = 0.35;
+const AMBIENT: f64 = 0.4;
 /// The back of the surface, which its normal points away from, is this much darker.
 const BACK: f64 = 0.75;
 /// Samples along each side of a pixel.
@@ -182,7 +182,8 @@ impl Camera {
         let lamp = (self.view - 0.6 * self.right + 0.8 * self.up).normalize();
         let back = normal.dot(self.view) < 0.0;
         let normal = if back { -normal } else { normal };
-        let light = AMBIENT + (1.0 - AMBIENT) * normal.dot(lamp).max(0.0);
+        // Half of what faces away from the lamp would be black; so the form shows there too, and colours can be read.
+        let light = AMBIENT + (1.0 - AMBIENT) * (0.5 + 0.5 * normal.dot(lamp));
         if back { BACK * light } else { light }
     }
 }
