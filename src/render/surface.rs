@@ -365,10 +365,9 @@ mod tests {
                 "a hidden point"
             );
         }
-        assert_eq!(
-            beside(&[SurfacePicture::new(&tube, &colours).render().unwrap()]).unwrap().width(),
-            1600
-        );
+        let one = SurfacePicture::new(&tube, &colours).render().unwrap();
+        assert_eq!(one.width().max(one.height()), 1600);
+        assert_eq!(beside(&[one.clone(), one.clone()]).unwrap().width(), 2 * one.width());
         assert!(SurfacePicture::new(&tube, &colours[1..]).render().is_err());
         assert!(
             SurfacePicture { view: DVec3::ZERO, ..SurfacePicture::new(&tube, &colours) }

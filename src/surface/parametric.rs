@@ -107,7 +107,8 @@ impl SurfaceJet {
     /// Second fundamental form `B_ij = S_ij · n`. Positive along `v` where the surface bends towards the normal.
     #[must_use]
     pub fn second_form(&self) -> Sym2 {
-        let [xx, xy, yy] = self.second.map(|s| s.dot(self.normal()));
+        let normal = self.normal();
+        let [xx, xy, yy] = self.second.map(|s| s.dot(normal));
         Sym2::new(xx, xy, yy)
     }
 

@@ -141,7 +141,8 @@ impl Knots {
     /// The index `k` with `u_k ≤ u < u_{k+1}` in the domain; at its end, that of the last stretch.
     fn span(&self, u: f64) -> usize {
         let inner = &self.knots[self.degree + 1..self.controls()];
-        self.degree + inner.partition_point(|&knot| knot <= u)
+        let [_, to] = self.domain();
+        self.degree + inner.partition_point(|&knot| knot <= u && knot < to)
     }
 
     /// The splines at a parameter, which is moved into the domain, with two derivatives; those from the right at a knot, from
@@ -160,18 +161,22 @@ impl Knots {
         let mut of = [[0.0; Self::MAX_DEGREE + 1]; 3];
         of[0][0] = 1.0;
         for j in 1..=self.degree {
-            let mut next = [[0.0; Self::MAX_DEGREE + 1]; 3];
+            // What the spline before leaves for this one.
+            let mut carried = [0.0; 3];
             for i in 0..j {
                 let (low, high) = (self.knots[span + 1 + i - j], self.knots[span + 1 + i]);
-                let q = of.map(|of| of[i] / (high - low));
-                next[0][i] += (high - u) * q[0];
-                next[0][i + 1] += (u - low) * q[0];
+                let inverse = 1.0 / (high - low);
+                let q = [of[0][i] * inverse, of[1][i] * inverse, of[2][i] * inverse];
+                of[0][i] = carried[0] + (high - u) * q[0];
+                carried[0] = (u - low) * q[0];
                 for k in 1..3 {
-                    next[k][i] -= j as f64 * q[k - 1];
-                    next[k][i + 1] += j as f64 * q[k - 1];
+                    of[k][i] = carried[k] - j as f64 * q[k - 1];
+                    carried[k] = j as f64 * q[k - 1];
                 }
             }
-            of = next;
+            for (of, carried) in of.iter_mut().zip(carried) {
+                of[j] = carried;
+            }
         }
         Basis { first: span - self.degree, of }
     }

@@ -3,10 +3,10 @@
 //! [`NurbsSurface`] is the map and its exact derivatives, `knots` the splines of one parameter, `curve` profiles, sections and
 //! trajectories, `shapes` surfaces made of them, `file` the JSON form, [`NurbsGrid`] a surface with nodes.
 //!
-//! Ours, and not a crate's: beside values we need second derivatives, directions that close, poles, and input that is
-//! checked before it is believed, which is all that is here. curvo, the fullest, brings solvers and a mesh kernel and
-//! takes control nets and knots that do not fit; truck-geometry has the derivatives but neither checked files, closed
-//! directions nor the constructors.
+//! Ours, and not a crate's: directions that close, poles, Möbius maps and input that is checked before it is believed are most of
+//! what is here beside the few lines that evaluate. truck-geometry has none of these and evaluates each derivative by itself;
+//! curvo, the fullest, takes nets and knots that do not fit together, allocates at every point, and brings an optimiser and a
+//! mesh kernel along.
 
 mod curve;
 mod file;
@@ -151,18 +151,22 @@ impl NurbsSurface {
     /// The jet on a line whose control points begin with the first that bears on it. The quotient rule for `S = A/w` (The NURBS
     /// Book, equation 4.20): `S_1 = (A_1 − w_1 S)/w`, `S_12 = (A_12 − w_1 S_2 − w_2 S_1 − w_12 S)/w`.
     fn jet_on(&self, u1: &Basis, line: &[[DVec4; 3]]) -> SurfaceJet {
-        let sum = |k: usize, l: usize| -> DVec4 {
-            (0..=self.knots[0].degree()).map(|i| u1.of[k][i] * line[i][l]).sum()
-        };
-        let a = sum(0, 0);
+        let [mut a, mut a1, mut a2, mut a11, mut a12, mut a22] = [DVec4::ZERO; 6];
+        for (i, [p, p2, p22]) in line.iter().take(self.knots[0].degree() + 1).enumerate() {
+            let [n, n1, n2] = [u1.of[0][i], u1.of[1][i], u1.of[2][i]];
+            a += n * *p;
+            a1 += n1 * *p;
+            a11 += n2 * *p;
+            a2 += n * *p2;
+            a12 += n1 * *p2;
+            a22 += n * *p22;
+        }
         let inverse = a.w.recip();
         let point = a.xyz() * inverse;
-        let [a1, a2] = [sum(1, 0), sum(0, 1)];
         let first = [a1, a2].map(|a| (a.xyz() - a.w * point) * inverse);
-        let second = [(sum(2, 0), 0, 0), (sum(1, 1), 0, 1), (sum(0, 2), 1, 1)].map(|(a, i, j)| {
-            let w = [a1.w, a2.w];
-            (a.xyz() - w[i] * first[j] - w[j] * first[i] - a.w * point) * inverse
-        });
+        let w = [a1.w, a2.w];
+        let second = [(a11, 0, 0), (a12, 0, 1), (a22, 1, 1)]
+            .map(|(a, i, j)| (a.xyz() - w[i] * first[j] - w[j] * first[i] - a.w * point) * inverse);
         SurfaceJet { point, first, second }
     }
 

@@ -1,8 +1,10 @@
+use proptest::prelude::*;
+
 use super::*;
-use crate::ParametricSurface;
+use crate::{Control, Metric, ParametricSurface};
 
 /// A half circle of radius 2 about the origin from the top of the z axis to its bottom.
-pub(crate) fn meridian() -> NurbsCurve {
+fn meridian() -> NurbsCurve {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let points = [
         DVec4::new(0.0, 0.0, 2.0, 1.0),
@@ -197,9 +199,8 @@ fn lofts_go_through_their_sections() {
 fn sweeps_keep_their_section_and_do_not_twist() {
     // A circle carried round a quarter circle is a part of a torus.
     let section = NurbsCurve::ellipse(DVec3::ZERO, 0.5 * DVec3::X, 0.5 * DVec3::Y).unwrap();
-    let arc: Vec<DVec3> = (0..20)
-        .map(|k| DVec3::from(glam::DVec2::from_angle(1.5 * f64::from(k) / 19.0).extend(0.0)) * 3.0)
-        .collect();
+    let arc: Vec<DVec3> =
+        (0..20).map(|k| DVec2::from_angle(1.5 * f64::from(k) / 19.0).extend(0.0) * 3.0).collect();
     let trajectory = NurbsCurve::through(&arc, 3).unwrap();
     let tube = NurbsSurface::sweep(&section, &trajectory, DVec3::Z, 40).unwrap();
     for u in places(&tube) {
@@ -214,4 +215,46 @@ fn sweeps_keep_their_section_and_do_not_twist() {
     assert!(NurbsSurface::sweep(&section, &trajectory, trajectory.tangent(0.0), 40).is_err());
     assert!(NurbsSurface::sweep(&section, &trajectory, DVec3::Z, 3).is_err());
     assert!(NurbsSurface::sweep(&section, &trajectory, DVec3::Z, usize::MAX).is_err());
+}
+
+/// Degree and knots, right or wrong.
+fn any_knots() -> impl Strategy<Value = (usize, Vec<f64>)> {
+    let step = prop_oneof![4 => Just(0.0), 4 => Just(1.0), 1 => -0.5..3.0, 1 => Just(f64::NAN)];
+    (0..5_usize, prop::collection::vec(step, 0..14)).prop_map(|(degree, steps)| {
+        let ascend = steps.iter().scan(0.0, |u, step| {
+            *u += step;
+            Some(*u)
+        });
+        (degree, ascend.collect())
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// Whatever is accepted can be evaluated everywhere, and is itself again by way of a file.
+    #[test]
+    fn nonsense_is_refused_and_the_rest_is_finite(
+        knots in [any_knots(), any_knots()],
+        closed in any::<[bool; 2]>(),
+        flat in any::<bool>(),
+        points in prop::collection::vec([-1.0..1.0, -1.0..1.0, -1.0..1.0, 0.1..2.0f64], 144),
+    ) {
+        let [Ok(first), Ok(second)] = knots.map(|(degree, knots)| Knots::new(degree, knots)) else {
+            return Ok(());
+        };
+        let count = first.controls() * second.controls();
+        let points: Vec<DVec4> = points.into_iter().cycle().take(count).map(DVec4::from).map(|p| if flat { p.with_z(0.0) } else { p }).collect();
+        let Ok(surface) = NurbsSurface::new([first, second], closed, &points) else { return Ok(()) };
+        for u in places(&surface).chain([DVec2::splat(-1e9), DVec2::splat(1e9)]) {
+            let jet = surface.jet(u);
+            let all = jet.first.iter().chain(&jet.second).chain([&jet.point]);
+            prop_assert!(all.into_iter().all(|v| v.is_finite()));
+        }
+        let again = NurbsSurface::from_json(&surface.to_json()).unwrap();
+        prop_assert!(again.jet(DVec2::ONE).point.distance(surface.jet(DVec2::ONE).point) < 1e-12);
+        let grid = surface.on_grid(5, 4).unwrap();
+        let metric = Metric::Curvature(Default::default()).on_surface(&grid).unwrap();
+        metric.sample(&Control::default()).unwrap();
+    }
 }
