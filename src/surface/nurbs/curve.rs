@@ -99,7 +99,7 @@ impl NurbsCurve {
     /// `k`-th derivative of `(w x, w y, w z, w)`.
     fn sum(&self, u: f64, k: usize) -> DVec4 {
         let basis = self.knots.basis(u);
-        (0..=self.knots.degree()).map(|i| basis.of[k][i] * self.net[basis.first + i]).sum()
+        (0..=self.knots.degree()).map(|i| basis.of[i][k] * self.net[basis.first + i]).sum()
     }
 
     /// The same curve with one more knot at `u`.
@@ -181,7 +181,7 @@ pub(super) fn interpolated(knots: &Knots, places: &[f64], mut values: Vec<DVec4>
             if let Some(entry) =
                 (basis.first + i + p).checked_sub(k).and_then(|at| band[k].get_mut(at))
             {
-                *entry = basis.of[0][i];
+                *entry = basis.of[i][0];
             }
         }
     }

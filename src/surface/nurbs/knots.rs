@@ -18,8 +18,8 @@ pub struct Knots {
 pub(super) struct Basis {
     /// Index of the first.
     pub(super) first: usize,
-    /// `of[k][i]`: the `k`-th derivative of spline `first + i`.
-    pub(super) of: [[f64; Knots::MAX_DEGREE + 1]; 3],
+    /// `of[i]`: spline `first + i` and its first and second derivative.
+    pub(super) of: [[f64; 3]; Knots::MAX_DEGREE + 1],
 }
 
 impl Knots {
@@ -158,25 +158,23 @@ impl Knots {
         let [from, to] = self.domain();
         let u = u.clamp(from, to);
         let span = self.span(u);
-        let mut of = [[0.0; Self::MAX_DEGREE + 1]; 3];
+        let mut of = [[0.0; 3]; Self::MAX_DEGREE + 1];
         of[0][0] = 1.0;
         for j in 1..=self.degree {
             // What the spline before leaves for this one.
             let mut carried = [0.0; 3];
-            for i in 0..j {
+            for (i, n) in of.iter_mut().enumerate().take(j) {
                 let (low, high) = (self.knots[span + 1 + i - j], self.knots[span + 1 + i]);
-                let inverse = 1.0 / (high - low);
-                let q = [of[0][i] * inverse, of[1][i] * inverse, of[2][i] * inverse];
-                of[0][i] = carried[0] + (high - u) * q[0];
-                carried[0] = (u - low) * q[0];
-                for k in 1..3 {
-                    of[k][i] = carried[k] - j as f64 * q[k - 1];
-                    carried[k] = j as f64 * q[k - 1];
-                }
+                let q = n.map(|n| n / (high - low));
+                let slopes = [q[0], q[1]].map(|q| j as f64 * q);
+                *n = [
+                    carried[0] + (high - u) * q[0],
+                    carried[1] - slopes[0],
+                    carried[2] - slopes[1],
+                ];
+                carried = [(u - low) * q[0], slopes[0], slopes[1]];
             }
-            for (of, carried) in of.iter_mut().zip(carried) {
-                of[j] = carried;
-            }
+            of[j] = carried;
         }
         Basis { first: span - self.degree, of }
     }
@@ -266,7 +264,7 @@ mod tests {
                     let basis = knots.basis(u);
                     let mut all = vec![[0.0; 3]; knots.controls()];
                     for i in 0..=degree {
-                        all[basis.first + i] = [0, 1, 2].map(|k| basis.of[k][i]);
+                        all[basis.first + i] = basis.of[i];
                     }
                     all
                 };

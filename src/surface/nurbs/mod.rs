@@ -137,10 +137,10 @@ impl NurbsSurface {
         let stride = self.knots[0].controls();
         cols.map(|col| {
             let mut sums = [DVec4::ZERO; 3];
-            for j in 0..=self.knots[1].degree() {
+            for (j, of) in u2.of.iter().enumerate().take(self.knots[1].degree() + 1) {
                 let p = self.net[(u2.first + j) * stride + col];
-                for (sum, of) in sums.iter_mut().zip(&u2.of) {
-                    *sum += of[j] * p;
+                for (sum, n) in sums.iter_mut().zip(of) {
+                    *sum += *n * p;
                 }
             }
             sums
@@ -152,8 +152,8 @@ impl NurbsSurface {
     /// Book, equation 4.20): `S_1 = (A_1 − w_1 S)/w`, `S_12 = (A_12 − w_1 S_2 − w_2 S_1 − w_12 S)/w`.
     fn jet_on(&self, u1: &Basis, line: &[[DVec4; 3]]) -> SurfaceJet {
         let [mut a, mut a1, mut a2, mut a11, mut a12, mut a22] = [DVec4::ZERO; 6];
-        for (i, [p, p2, p22]) in line.iter().take(self.knots[0].degree() + 1).enumerate() {
-            let [n, n1, n2] = [u1.of[0][i], u1.of[1][i], u1.of[2][i]];
+        for ([p, p2, p22], &[n, n1, n2]) in line.iter().zip(&u1.of).take(self.knots[0].degree() + 1)
+        {
             a += n * *p;
             a1 += n1 * *p;
             a11 += n2 * *p;
@@ -226,7 +226,7 @@ impl NurbsSurface {
                 |k: usize, i: usize| self.net[if axis == 0 { k * cols + i } else { i * cols + k }];
             let sum = |k: usize| {
                 (0..=self.knots[axis].degree())
-                    .map(|i| basis.of[0][i] * at(k, basis.first + i))
+                    .map(|i| basis.of[i][0] * at(k, basis.first + i))
                     .sum()
             };
             (0..self.knots[1 - axis].controls()).map(sum).collect()
