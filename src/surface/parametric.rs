@@ -42,7 +42,7 @@ pub trait ParametricSurface: Sync {
     /// Area, m², and root mean square of the principal curvatures over it, `√(∫ (κ1² + κ2²)/2 dA / ∫ dA)` in 1/m, from the
     /// nodes by the trapezoidal rule.
     fn measures(&self) -> Measures {
-        area_and_curvature(self)
+        measured(self, |_, _| true)
     }
 }
 
@@ -55,21 +55,27 @@ pub struct Measures {
     pub rms_curvature: f64,
 }
 
-fn area_and_curvature(surface: &(impl ParametricSurface + ?Sized)) -> Measures {
-    let counts = [surface.cols(), surface.rows()];
+/// The measures from the nodes, `(column, row)`, that count.
+pub(super) fn measured(
+    surface: &(impl ParametricSurface + ?Sized),
+    counts: impl Fn(usize, usize) -> bool + Sync,
+) -> Measures {
+    let nodes = [surface.cols(), surface.rows()];
     let share = |axis: usize, at: usize| {
-        let is_end = at == 0 || at + 1 == counts[axis];
+        let is_end = at == 0 || at + 1 == nodes[axis];
         if is_end && !surface.periodic()[axis] { 0.5 } else { 1.0 }
     };
     let of_row = |row: usize| {
         let jets = surface.row_space_jets(row).into_iter().enumerate();
-        let known = jets.filter(|(col, jet)| jet.is_regular() && !surface.is_void(*col, row));
+        let known = jets.filter(|(col, jet)| {
+            jet.is_regular() && !surface.is_void(*col, row) && counts(*col, row)
+        });
         known.fold([0.0; 2], |[area, square], (col, jet)| {
             let piece = share(0, col) * share(1, row) * jet.area();
             [area + piece, square + piece * jet.squared_curvature()]
         })
     };
-    let rows: Vec<[f64; 2]> = (0..counts[1]).into_par_iter().map(of_row).collect();
+    let rows: Vec<[f64; 2]> = (0..nodes[1]).into_par_iter().map(of_row).collect();
     // Added row by row, so that the sum does not depend on the number of threads.
     let [area, square] =
         rows.iter().fold([0.0; 2], |[a, s], [area, square]| [a + area, s + square]);
@@ -163,7 +169,7 @@ impl ParametricSurface for HeightSurface {
 
     /// The means are those of [`rms_curvature`](Self::rms_curvature), over the map.
     fn measures(&self) -> Measures {
-        let area = area_and_curvature(self).area;
+        let area = measured(self, |_, _| true).area;
         Measures { area, rms_curvature: self.rms_curvature() }
     }
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{NurbsSurface, SMALL, size};
-use crate::surface::{ParametricSurface, SurfaceJet};
+use crate::surface::parametric::{Measures, ParametricSurface, SurfaceJet, measured};
 use crate::{Error, Result};
 
 /// A [`NurbsSurface`] whose parameters are those of a grid: equal steps of the surface's own, from end to end of its domain or,
@@ -111,6 +111,15 @@ impl ParametricSurface for NurbsGrid {
 
     fn periodic(&self) -> [bool; 2] {
         self.surface.closed
+    }
+
+    /// Without the nodes of poles: they have no area, and the curvature of a tip would outweigh all else.
+    fn measures(&self) -> Measures {
+        let is_pole = |axis: usize, at: usize| {
+            let [least, most] = self.bounds[axis];
+            (at as f64) < least || at as f64 > most
+        };
+        measured(self, |col, row| !is_pole(0, col) && !is_pole(1, row))
     }
 
     fn space_jet(&self, at: DVec2) -> SurfaceJet {

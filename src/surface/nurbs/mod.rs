@@ -174,6 +174,9 @@ impl NurbsSurface {
     ///
     /// # Errors
     /// A `u` that is not inside the domain or is a knot as often as possible already.
+    ///
+    /// # Panics
+    /// If the direction is not 0 or 1.
     pub fn with_knot(&self, direction: usize, u: f64) -> Result<Self> {
         let (knots, shares) = self.knots[direction].inserted(u)?;
         Ok(self.with_lines(direction, knots, |line| curve::inserted(line, &shares)))
@@ -185,6 +188,9 @@ impl NurbsSurface {
     ///
     /// # Errors
     /// A ratio that is not above 0, or so far from 1 that weights leave their range or a knot outside the domain goes to infinity.
+    ///
+    /// # Panics
+    /// If the direction is not 0 or 1.
     pub fn reweighted(&self, direction: usize, ratio: f64) -> Result<Self> {
         let (knots, factors) = self.knots[direction].moebius(ratio)?;
         let surface = self.with_lines(direction, knots, |line| {
@@ -202,15 +208,13 @@ impl NurbsSurface {
         change: impl Fn(&[DVec4]) -> Vec<DVec4>,
     ) -> Self {
         let cols = self.knots[0].controls();
-        let net = match axis {
-            0 => self.net.chunks(cols).flat_map(change).collect(),
-            _ => transposed(
-                &transposed(&self.net, cols)
-                    .chunks(self.knots[1].controls())
-                    .flat_map(change)
-                    .collect::<Vec<_>>(),
-                knots.controls(),
-            ),
+        let net = if axis == 0 {
+            self.net.chunks(cols).flat_map(change).collect()
+        } else {
+            let columns = transposed(&self.net, cols);
+            let changed: Vec<DVec4> =
+                columns.chunks(self.knots[1].controls()).flat_map(change).collect();
+            transposed(&changed, knots.controls())
         };
         let mut all = self.knots.clone();
         all[axis] = knots;

@@ -217,6 +217,18 @@ fn sweeps_keep_their_section_and_do_not_twist() {
     assert!(NurbsSurface::sweep(&section, &trajectory, DVec3::Z, usize::MAX).is_err());
 }
 
+#[test]
+fn areas_and_mean_curvatures_are_those_of_the_surface() {
+    let measures = sphere().on_grid(100, 81).unwrap().measures();
+    assert!((measures.area / (16.0 * std::f64::consts::PI) - 1.0).abs() < 1e-3);
+    assert!((measures.rms_curvature - 0.5).abs() < 1e-9);
+    // The tip of a cone has no bounds to its curvature, but no area either.
+    let side = NurbsCurve::polyline(&[DVec3::Z, DVec3::X]).unwrap();
+    let cone = NurbsSurface::revolve(&side, DVec3::ZERO, DVec3::Z).unwrap();
+    let rms = |n| cone.clone().on_grid(n, n).unwrap().measures().rms_curvature;
+    assert!(rms(200) < 1.15 * rms(100), "{} {}", rms(200), rms(100));
+}
+
 /// Degree and knots, right or wrong.
 fn any_knots() -> impl Strategy<Value = (usize, Vec<f64>)> {
     let step = prop_oneof![4 => Just(0.0), 4 => Just(1.0), 1 => -0.5..3.0, 1 => Just(f64::NAN)];
