@@ -35,7 +35,9 @@
 //! * [`terrain`]: [`Terrain::open`] reads GeoTIFF, ESRI ASCII grids and SRTM tiles; [`terrain::synthetic`] makes terrains
 //!   with known answers. Heights are metres, voids `NaN`, row 0 is north.
 //! * [`surface`]: [`HeightSurface::fit`] makes the tensor-product B-spline `z(x, y)`; a [`HeightJet`] is its value and
-//!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape.
+//!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape. Surfaces that are no terrain are
+//!   [`NurbsSurface`]s or the user's own [`ParametricSurface`]s: [`Metric::on_surface`], [`Solver::solve_field`] and
+//!   [`route::trace_on`] do the same on them.
 //! * [`metric`]: [`Metric::on`] binds a metric to a surface: [`MetricField::speed`] is the tensor `D` there.
 //! * [`eikonal`]: [`Solver::solve`] solves `√(∇gᵀ D ∇g) = 1` from a [`StartRegion`] into a [`DistanceMap`].
 //! * [`route`]: [`route::trace`] descends on `g` from the goal; a [`Route`] carries its numbers; [`Comparison`] sets several
@@ -78,7 +80,10 @@ pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion, Stop};
 pub use error::{Error, Result};
 pub use grid::{GridFrame, Ground};
-pub use metric::{Delta, Metric, MetricField, Modifiers, Sym2};
+pub use metric::{Delta, Metric, MetricField, Modifiers, SurfaceMetric, Sym2};
 pub use route::{Comparison, Route};
-pub use surface::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
+pub use surface::{
+    Degree, FitOptions, HeightJet, HeightSurface, Knots, NurbsCurve, NurbsGrid, NurbsSurface,
+    ParametricSurface, Smoothing, SurfaceJet,
+};
 pub use terrain::{Crs, Terrain};

@@ -1,7 +1,7 @@
 //! The curvature tensor CT of the paper, equation (4).
 
 use super::Sym2;
-use crate::HeightJet;
+use crate::{HeightJet, SurfaceJet};
 
 /// `G⁻¹`, the speed tensor of the geodesic distance, and its determinant.
 #[inline(always)]
@@ -59,6 +59,20 @@ pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
     };
     let inverse = 1.0 / (e * e + e * sum + hw.abs());
     ((aza * q + a * c) * (root * inverse), w * w * inverse)
+}
+
+/// The same on any surface, in grid coordinates: the first formula above with `H`, `K`, `G` and `B` as they are.
+pub(super) fn of_surface(jet: &SurfaceJet, delta: f64) -> Sym2 {
+    let (inverse, b) = (jet.first_form().inverse(), jet.second_form());
+    let [h, k] = jet.mean_and_gaussian();
+    let (q, c, sum) = if k < 0.0 {
+        let r = (h * h - k).sqrt();
+        (-h / r, delta + r + h * h / r, 2.0 * r)
+    } else {
+        (-1f64.copysign(h), delta + 2.0 * h.abs(), 2.0 * h.abs())
+    };
+    let raised = b.within(inverse);
+    (raised * q + inverse * c) * (delta * delta + delta * sum + k.abs()).recip()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@
 
 mod block;
 mod curvature;
+mod space;
 mod sym2;
 
 use std::sync::Arc;
@@ -23,9 +24,10 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 pub(crate) use self::block::SpeedBlock;
+pub use self::space::SurfaceMetric;
 pub use self::sym2::Sym2;
 use crate::surface::BLOCK;
-use crate::{Error, HeightJet, HeightSurface, Result};
+use crate::{Error, HeightJet, HeightSurface, ParametricSurface, Result};
 
 /// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +44,8 @@ impl Delta {
     /// Default share of the root-mean-square curvature.
     pub const DEFAULT_SHARE: f64 = 0.1;
 
-    fn resolve(self, surface: &HeightSurface) -> Result<f64> {
+    /// The offset on a surface of this root-mean-square curvature and length.
+    fn resolve(self, rms_curvature: impl FnOnce() -> f64, extent: f64) -> Result<f64> {
         let check = |value: f64, what: &str| {
             if value.is_finite() && value > 0.0 {
                 Ok(value)
@@ -54,10 +57,9 @@ impl Delta {
             Self::Absolute(delta) => check(delta, "delta"),
             Self::Auto(share) => {
                 let share = check(share, "the share of the curvature that delta is to be")?;
-                let extent = extent(surface);
                 // Curvature below this is rounding: the sagitta over the whole extent is under 1e-9 of it.
                 let flat = 1e-8 / extent;
-                let rms = surface.rms_curvature();
+                let rms = rms_curvature();
                 Ok(if rms > flat { share * rms } else { extent.recip() })
             }
         }
@@ -85,7 +87,7 @@ pub enum Metric {
     /// The curvature tensor CT: `D = Σ 1/(δ+|κ_i|) w_i w_iᵀ`.
     Curvature(Delta),
     /// The user's own speed tensors `D` at the nodes, row-major from the north-west, in ground axes
-    /// (x east, y north). A node whose tensor is not finite is a barrier. Between nodes `D` is bilinear.
+    /// (x east, y north); on a [`ParametricSurface`] in grid coordinates (column, row). A node whose tensor is not finite is a barrier. Between nodes `D` is bilinear.
     Tensor(Arc<[Sym2]>),
 }
 
@@ -136,7 +138,10 @@ impl Metric {
     ) -> Result<MetricField<'a>> {
         let speed = match self {
             Self::Isotropic => Speed::Isotropic,
-            Self::Curvature(delta) => Speed::Curvature { delta: delta.resolve(surface)? },
+            Self::Curvature(delta) => {
+                let delta = delta.resolve(|| surface.rms_curvature(), extent(surface))?;
+                Speed::Curvature { delta }
+            }
             Self::Tensor(tensors) => {
                 check_tensors(surface, tensors)?;
                 Speed::Tensor(Arc::clone(tensors))
@@ -177,14 +182,12 @@ fn check_costs(surface: &HeightSurface, costs: &[f32]) -> Result<()> {
     }
 }
 
-fn check_tensors(surface: &HeightSurface, tensors: &[Sym2]) -> Result<()> {
-    let frame = surface.frame();
-    if tensors.len() != frame.nodes() {
+fn check_tensors(surface: &dyn ParametricSurface, tensors: &[Sym2]) -> Result<()> {
+    let (cols, rows) = (surface.cols(), surface.rows());
+    if tensors.len() != cols * rows {
         return Err(Error::usage(format!(
-            "the tensor raster has {} cells, the terrain {} columns × {} rows; they must cover the same grid",
-            tensors.len(),
-            frame.cols(),
-            frame.rows()
+            "the tensor raster has {} cells, the surface {cols} columns × {rows} rows; they must cover the same grid",
+            tensors.len()
         )));
     }
     let finite = |d: &Sym2| d.xx.is_finite() && d.xy.is_finite() && d.yy.is_finite();
@@ -199,8 +202,8 @@ fn check_tensors(surface: &HeightSurface, tensors: &[Sym2]) -> Result<()> {
                 d.xy,
                 d.xy,
                 d.yy,
-                i % frame.cols(),
-                i / frame.cols()
+                i % cols,
+                i / cols
             )))
         }
     }

@@ -65,6 +65,14 @@ impl Sym2 {
         Self::new(self.xx * s.x * s.x, self.xy * s.x * s.y, self.yy * s.y * s.y)
     }
 
+    /// `P A P` for a symmetric `P`.
+    #[must_use]
+    pub fn within(self, p: Self) -> Self {
+        let (a, b) = (self.apply(DVec2::new(p.xx, p.xy)), self.apply(DVec2::new(p.xy, p.yy)));
+        let (a, b) = (p.apply(a), p.apply(b));
+        Self::new(a.x, a.y, b.y)
+    }
+
     /// Whether the matrix is finite, symmetric positive definite.
     #[must_use]
     pub fn is_positive_definite(self) -> bool {

@@ -155,7 +155,10 @@ fn polyline_path(points: &[Vec2], closed: bool) -> Option<Path> {
 }
 
 /// The opaque picture as PNG, 8 bits per channel without alpha.
-pub(super) fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
+///
+/// # Errors
+/// [`Error::Usage`] if it cannot be encoded.
+pub fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
     let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());

@@ -4,6 +4,7 @@ use glam::DVec2;
 use tiny_skia::Pixmap;
 
 use super::canvas::{self, Rgb};
+use super::relief::VOID;
 use super::sheet::{Item, SIDE, Sheet};
 use super::text::number;
 use crate::export::round_step;
@@ -22,6 +23,45 @@ pub enum Gradient {
     Sequential,
     /// Around zero, alike on both sides (ColorBrewer's purple and orange).
     Diverging,
+}
+
+impl Gradient {
+    /// Colours of values, from the least to the greatest of them; grey where there is none.
+    #[must_use]
+    pub fn colours(self, values: &[f32]) -> Vec<Rgb> {
+        let [low, high] = self.range(values).unwrap_or([0.0, 1.0]);
+        let colour = |v: f32| self.colour((f64::from(v) - low) / (high - low));
+        values.iter().map(|&v| if v.is_finite() { colour(v) } else { VOID[0] }).collect()
+    }
+
+    /// Values at the ends of the bar, never equal; `None` if there is no value at all.
+    fn range(self, values: &[f32]) -> Option<[f64; 2]> {
+        let mut known: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        if known.is_empty() {
+            return None;
+        }
+        let [low, high] = match self {
+            Self::Sequential => [f32::min, f32::max]
+                .map(|pick| f64::from(known.iter().copied().fold(known[0], pick))),
+            Self::Diverging => {
+                let rank = (SHOWN * (known.len() - 1) as f64).round() as usize;
+                let (_, end, _) =
+                    known.select_nth_unstable_by(rank, |a, b| a.abs().total_cmp(&b.abs()));
+                let end = f64::from(end.abs());
+                [-end, end]
+            }
+        };
+        Some(if high > low { [low, high] } else { [low - 0.5, high + 0.5] })
+    }
+
+    fn colour(self, share: f64) -> Rgb {
+        let gradient = match self {
+            Self::Sequential => colorous::VIRIDIS,
+            Self::Diverging => colorous::PURPLE_ORANGE,
+        };
+        let colorous::Color { r, g, b } = gradient.eval_continuous(share.clamp(0.0, 1.0));
+        Rgb(r, g, b)
+    }
 }
 
 /// What a picture of a field shows.
@@ -72,11 +112,13 @@ impl<'a> FieldPicture<'a> {
                 self.frame.nodes()
             )));
         }
-        let range = self.range();
+        let range = self.gradient.range(self.values);
         let mut legend = Vec::new();
         if let Some([low, high]) = range {
             legend.push(Item::Bar {
-                colours: (0..SHADES).map(|i| self.colour(i as f64 / (SHADES - 1) as f64)).collect(),
+                colours: (0..SHADES)
+                    .map(|i| self.gradient.colour(i as f64 / (SHADES - 1) as f64))
+                    .collect(),
                 ticks: ticks(low, high),
                 label: self.label.clone(),
             });
@@ -88,7 +130,7 @@ impl<'a> FieldPicture<'a> {
         sheet.ground(|grid| {
             let [low, high] = range?;
             let share = (self.value(grid)? - low) / (high - low);
-            Some(self.colour(share))
+            Some(self.gradient.colour(share))
         });
         Ok(sheet.finish())
     }
@@ -101,40 +143,11 @@ impl<'a> FieldPicture<'a> {
         canvas::png(&self.render()?)
     }
 
-    /// Values at the ends of the bar, never equal; `None` if there is no value at all.
-    fn range(&self) -> Option<[f64; 2]> {
-        let mut known: Vec<f32> = self.values.iter().copied().filter(|v| v.is_finite()).collect();
-        if known.is_empty() {
-            return None;
-        }
-        let [low, high] = match self.gradient {
-            Gradient::Sequential => [f32::min, f32::max]
-                .map(|pick| f64::from(known.iter().copied().fold(known[0], pick))),
-            Gradient::Diverging => {
-                let rank = (SHOWN * (known.len() - 1) as f64).round() as usize;
-                let (_, end, _) =
-                    known.select_nth_unstable_by(rank, |a, b| a.abs().total_cmp(&b.abs()));
-                let end = f64::from(end.abs());
-                [-end, end]
-            }
-        };
-        Some(if high > low { [low, high] } else { [low - 0.5, high + 0.5] })
-    }
-
     /// The value at grid coordinates: that of the nearest node (a field may be discontinuous).
     fn value(&self, grid: DVec2) -> Option<f64> {
         let node = self.frame.clamp(grid).round();
         let value = self.values[self.frame.index(node.x as usize, node.y as usize)];
         value.is_finite().then_some(f64::from(value))
-    }
-
-    fn colour(&self, share: f64) -> Rgb {
-        let gradient = match self.gradient {
-            Gradient::Sequential => colorous::VIRIDIS,
-            Gradient::Diverging => colorous::PURPLE_ORANGE,
-        };
-        let colorous::Color { r, g, b } = gradient.eval_continuous(share.clamp(0.0, 1.0));
-        Rgb(r, g, b)
     }
 }
 
@@ -161,8 +174,8 @@ mod tests {
         let frame = GridFrame::new(3, 1, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap();
         let values = [0.0, 50.0, f32::NAN];
         let field = FieldPicture::new(&frame, &values, Gradient::Sequential, "d (m)");
-        assert_eq!(field.range(), Some([0.0, 50.0]));
-        assert_eq!(field.colour(0.0), Rgb(68, 1, 84));
+        assert_eq!(field.gradient.range(&values), Some([0.0, 50.0]));
+        assert_eq!(field.gradient.colour(0.0), Rgb(68, 1, 84));
         assert!(field.value(DVec2::new(1.4, 0.2)) == Some(50.0));
         assert!(field.value(DVec2::new(1.6, 0.0)).is_none());
         field.png().unwrap();
@@ -174,7 +187,7 @@ mod tests {
         let mut values = vec![-2.0; 100];
         values[0] = 1e6;
         let field = FieldPicture::new(&frame, &values, Gradient::Diverging, "K");
-        assert_eq!(field.range(), Some([-2.0, 2.0]));
+        assert_eq!(field.gradient.range(&values), Some([-2.0, 2.0]));
     }
 
     #[test]

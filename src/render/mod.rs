@@ -1,6 +1,6 @@
 //! Pictures: maps of routes and isolines over shaded terrain, and fields in colour.
 //!
-//! A picture is a sheet: a title, the map in its true proportions on the ground, and below it the
+//! A [`SurfacePicture`] shows a surface in space. Any other picture is a sheet: a title, the map in its true proportions on the ground, and below it the
 //! scale bar and the legend, which therefore never cover the map.
 
 mod canvas;
@@ -8,8 +8,10 @@ mod field;
 mod map;
 mod relief;
 mod sheet;
+mod surface;
 mod text;
 
-pub use self::canvas::Rgb;
+pub use self::canvas::{Rgb, png};
 pub use self::field::{FieldPicture, Gradient};
 pub use self::map::{IsolineLayer, MapPicture, RouteLayer};
+pub use self::surface::{SurfacePicture, beside};

@@ -12,7 +12,7 @@ use crate::{Error, GridFrame, Result};
 /// Pixels of the map's longer side unless told otherwise.
 pub(super) const SIDE: u32 = 1600;
 /// Fewest and most pixels of the map's longer side.
-const SIDES: std::ops::RangeInclusive<u32> = 100..=8192;
+pub(super) const SIDES: std::ops::RangeInclusive<u32> = 100..=8192;
 /// Sizes below are in pixels of a picture of [`SIDE`]; others scale them.
 const MARGIN: f32 = 24.0;
 const TITLE: f32 = 30.0;

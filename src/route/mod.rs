@@ -2,19 +2,21 @@
 //!
 //! [`trace`] follows the distance down from the goal (`descent.rs`) and moves the line to where it is shortest on the
 //! surface itself (`polish.rs`); [`Summary`] and [`ProfilePoint`] measure the line on
-//! the smooth surface (`profile.rs`); [`Comparison`] sets the routes of several metrics side by side.
+//! the smooth surface (`profile.rs`); [`trace_on`] does so on a surface in space; [`Comparison`] sets the routes of several metrics side by side.
 
 mod compare;
 mod descent;
 mod polish;
 mod profile;
+mod space;
 
 use glam::{DVec2, DVec3};
 
 pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
+pub use self::space::{SurfaceRoute, trace_on};
 use crate::eikonal::{TensorField, sees};
-use crate::{DistanceMap, Error, MetricField, Result};
+use crate::{DistanceMap, Error, MetricField, Result, Sym2};
 
 /// A route over a surface, from the start region to a goal.
 #[derive(Clone, Debug)]
@@ -38,27 +40,34 @@ pub struct Route {
 /// # Errors
 /// [`Error::NoWay`] if the front did not reach the goal.
 pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> Result<Route> {
-    let grid = descent::line(distance, goal).ok_or_else(|| {
+    let grid = shortest(distance, goal, &|at| metric.grid_metric(at)).ok_or_else(|| {
         let at = metric.surface().frame().to_map(goal);
         Error::NoWay(format!(
             "there is no way from the start to the goal at {}, {}: voids, barriers or too steep ground lie between",
             at.x, at.y
         ))
     })?;
-    let frame = metric.surface().frame();
-    let clear = |a, b| {
-        let field = &distance.field;
-        frame.contains(a) && frame.contains(b) && (is_open_around(field, a, b) || sees(field, a, b))
-    };
-    let grid = polish::polish(&grid, &|at| metric.grid_metric(at), &clear);
     Ok(Route::from_line(grid, metric))
+}
+
+/// The line that [`trace`] describes under a metric `M` in grid coordinates; `None` if the goal was not reached.
+fn shortest(
+    distance: &DistanceMap,
+    goal: DVec2,
+    metric: &impl Fn(DVec2) -> Sym2,
+) -> Option<Vec<DVec2>> {
+    let field = &distance.field;
+    let inside = |at| field.tiling.contains(at);
+    let clear = |a, b| inside(a) && inside(b) && (is_open_around(field, a, b) || sees(field, a, b));
+    Some(polish::polish(&descent::line(distance, goal)?, metric, &clear))
 }
 
 /// Whether all cells between two points nearby have open corners: then nothing can be in the way.
 fn is_open_around(field: &TensorField, a: DVec2, b: DVec2) -> bool {
-    let (first, last) = (a.min(b), a.max(b).ceil());
-    (first.y as usize..=last.y as usize)
-        .all(|row| (first.x as usize..=last.x as usize).all(|col| field.is_open(col, row)))
+    let (first, last) = (a.min(b).floor(), a.max(b).ceil());
+    let open = |col, row| field.tiling.node(col, row).is_some_and(|(c, r)| field.is_open(c, r));
+    (first.y as isize..=last.y as isize)
+        .all(|row| (first.x as isize..=last.x as isize).all(|col| open(col, row)))
 }
 
 impl Route {
