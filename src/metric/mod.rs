@@ -27,7 +27,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 pub(crate) use self::block::SpeedBlock;
-pub use self::difference::{Change, Difference, DifferenceForm, changes, neighbour_differences};
+pub use self::difference::{Change, Difference, DifferenceForm, neighbour_differences};
 pub use self::space::SurfaceMetric;
 pub use self::sym2::Sym2;
 use crate::surface::BLOCK;
@@ -61,8 +61,10 @@ impl Delta {
             Self::Absolute(delta) => check(delta, "delta"),
             Self::Auto(share) => {
                 let share = check(share, "the share of the curvature that delta is to be")?;
+                // Curvature below this is rounding: the sagitta over the whole extent is under 1e-9 of it.
+                let flat = 1e-8 / extent;
                 let rms = rms_curvature();
-                Ok(if rms > flat(extent) { share * rms } else { extent.recip() })
+                Ok(if rms > flat { share * rms } else { extent.recip() })
             }
         }
     }
@@ -72,11 +74,6 @@ impl Default for Delta {
     fn default() -> Self {
         Self::Auto(Self::DEFAULT_SHARE)
     }
-}
-
-/// Curvature up to this, 1/m, is rounding: the sagitta over the whole extent is under 1e-9 of it.
-fn flat(extent: f64) -> f64 {
-    1e-8 / extent
 }
 
 /// Length of the grid's diagonal, m.
