@@ -160,7 +160,7 @@ fn stretched_cells_give_the_same_distances_at_the_same_places() {
     let control = Control::default();
     for metric in metrics() {
         // Changes from node to node are a derivative more than curvature is.
-        let agreement = if matches!(metric, Metric::Difference(_)) { 0.06 } else { 0.03 };
+        let agreement = if matches!(metric, Metric::Difference(_)) { 0.08 } else { 0.03 };
         let [a, b] = [(&fine, 1.0), (&flat, 2.0)].map(|(terrain, stretch)| {
             let surface = HeightSurface::fit(terrain, &options, &control).unwrap();
             let field = metric.on(&surface, &Modifiers::default()).unwrap();

@@ -353,8 +353,8 @@ pub(crate) struct MetricArgs {
     /// curvature in 1/m.
     #[arg(long, value_name = "1/M", default_value = "auto", value_parser = delta, allow_hyphen_values = true)]
     pub(crate) delta: OrAuto<Delta>,
-    /// How much ground of even shape costs beside ground where the curvature changes, on the difference metrics: `auto` (a
-    /// tenth of the square of the mean rate of change), `auto:SHARE`, or a number in their own unit (none; m² if literal).
+    /// How much ground of even shape costs beside ground where the curvature changes, on the difference metrics: `auto` (the
+    /// square of the mean rate of change), `auto:SHARE` of it, or a number in their own unit (none; m² if literal).
     #[arg(long, value_name = "VALUE", default_value = "auto", value_parser = difference_delta, allow_hyphen_values = true)]
     pub(crate) difference_delta: OrAuto<Delta>,
     /// Aversion to grade: β of the term β∇z∇zᵀ added to the metric.

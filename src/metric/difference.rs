@@ -37,7 +37,8 @@ pub struct Difference {
     pub curvature_delta: Delta,
     /// `δ` beside `γ`. [`Delta::Auto`] is a share of the square of the mean of `√(γ1+γ2)` over the surface, but at least 1e-6
     /// (times the mean area of a cell, if literal): changes by less than a thousandth of the way are rounding.
-    /// [`Delta::Absolute`] is in the unit of `γ`.
+    /// [`Delta::Absolute`] is in the unit of `γ`. Default: all of it. With less, speeds differ so much with the direction that
+    /// the grid no longer resolves them.
     pub delta: Delta,
 }
 
@@ -46,7 +47,7 @@ impl Default for Difference {
         Self {
             form: DifferenceForm::default(),
             curvature_delta: Delta::Auto(1.0),
-            delta: Delta::default(),
+            delta: Delta::Auto(1.0),
         }
     }
 }
@@ -495,7 +496,7 @@ mod tests {
             changes.iter().map(|change| change.gamma.xx + change.gamma.yy).fold(0.0, f64::max)
         };
         let largest =
-            [still(&square(9, plane)), still(&square(9, cylinder)), still(&square(9, sphere))];
+            [still(&square(9, plane)), still(&square(33, cylinder)), still(&square(33, sphere))];
         assert!(largest.iter().all(|&gamma| gamma < 1e-6), "{largest:?}");
         // In space they turn. κ = 1/2, δ = 1/4
         let side = 201;
@@ -584,21 +585,19 @@ mod tests {
     fn missing_neighbours_are_left_out() {
         let voids = |col: usize, row: usize| (10..=20).contains(&col) && (10..=20).contains(&row);
         let side = 31;
-        for (form, tolerance) in [(Rate, 0.07), (Literal, 0.12)] {
+        for form in [Rate, Literal] {
             let whole = changes_of(&square(side, hills), form);
             let holed = changes_of(&Formula { voids, ..square(side, hills) }, form);
+            let most = whole.iter().map(|c| c.gamma.xx + c.gamma.yy).fold(0.0, f64::max);
             for (i, (a, b)) in whole.iter().zip(&holed).enumerate() {
                 let (col, row) = (i % side, i / side);
-                if !voids(col, row) {
-                    let scale = a.gamma.xx + a.gamma.yy;
-                    assert!(error(a.gamma, b.gamma) < tolerance * scale, "{form:?} {col} {row}");
-                }
+                let e = error(a.gamma, b.gamma);
+                assert!(voids(col, row) || e < 0.1 * most, "{form:?} {col} {row}: {e} {most}");
             }
             // No faster at the border than beside it.
             for col in 1..side - 1 {
-                let [border, inner] = [col, side + col].map(|i| whole[i].gamma);
-                let scale = inner.xx + inner.yy;
-                assert!(error(border, inner) < 2.0 * tolerance * scale, "{form:?} {col}");
+                let e = error(whole[col].gamma, whole[side + col].gamma);
+                assert!(e < 0.1 * most, "{form:?} {col}: {e} {most}");
             }
         }
         let island = Formula { voids: |col, row| col + row != 3, ..square(5, hills) };
