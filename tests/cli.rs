@@ -287,16 +287,17 @@ fn compare_fills_a_folder_and_repeats_itself() {
         "∫|κn|ds",
         "x isotropic",
         "x curvature",
+        "x difference",
     ] {
         assert!(head.contains(column), "{head}");
     }
     let summary = folder.json("cmp/summary.json");
-    for (r, metric) in ["isotropic", "curvature"].into_iter().enumerate() {
+    for (r, metric) in ["isotropic", "curvature", "difference"].into_iter().enumerate() {
         assert_eq!(summary["routes"][r]["name"], metric);
         assert_eq!(summary["routes"][r]["costs"][metric]["ratio_to_best"], 1.0);
     }
     assert!(is_png(&folder.path("cmp/map.png")));
-    assert_eq!(folder.json("cmp/routes.geojson")["features"].as_array().unwrap().len(), 2);
+    assert_eq!(folder.json("cmp/routes.geojson")["features"].as_array().unwrap().len(), 3);
     assert!(folder.read("cmp/profile.csv").contains("\nisotropic,"));
     folder.write("cmp/mine.txt", "keep");
     folder.bad(line, 2, "cmp/routes.geojson exists; give --overwrite to replace it");
@@ -492,12 +493,16 @@ fn bad_flags_are_explained() {
         (
             "--metric euclid",
             "invalid value 'euclid' for '--metric <METRIC>'\n  \
-             [possible values: isotropic, curvature, tensor]",
+             [possible values: isotropic, curvature, difference, difference-literal, tensor]",
         ),
         (
             "--delta -0.1",
             "invalid value '-0.1' for '--delta <1/M>': expected auto, auto:SHARE, or a curvature above 0 \
              in 1/m such as 0.001",
+        ),
+        (
+            "--metric difference --difference-delta 0",
+            "invalid value '0' for '--difference-delta <VALUE>': expected auto, auto:SHARE, or a number above 0",
         ),
         (
             "--smooth -3",

@@ -1,5 +1,7 @@
 //! The figures of Seong, Jeong and Cohen (2008): what each of them claims.
 
+#[path = "../examples/figures/half_cylinders.rs"]
+mod half_cylinders;
 #[path = "../examples/figures/parametrisations.rs"]
 mod parametrisations;
 #[path = "../examples/figures/shapes.rs"]
@@ -37,6 +39,28 @@ mod figure_5 {
         assert!((height(0, 25) - height(1, 25)).abs() > 0.5);
         for map in &compared.maps {
             assert!(map.to_row_major().iter().all(|g| g.is_finite()));
+        }
+    }
+}
+
+mod figure_8 {
+    use ridgeway::metric::Difference;
+    use ridgeway::{Delta, Metric};
+
+    use crate::half_cylinders::{HalfCylinders, divide};
+
+    /// From the same two seeds the border of the curvature tensor is not the seam, that of the difference tensor is.
+    #[test]
+    fn the_difference_tensor_finds_the_seam() {
+        for nodes in [50, 100, 200] {
+            let surface = HalfCylinders { nodes };
+            let right = |metric| divide(&surface, &metric).unwrap().1;
+            let curvature = right(Metric::Curvature(Delta::default()));
+            let difference = right(Metric::Difference(Difference::default()));
+            println!("{nodes}: {curvature:.4} {difference:.4}");
+            assert!(curvature < 0.95, "{nodes}: {curvature}");
+            // Within a column.
+            assert!(difference >= 1.0 - 1.0 / nodes as f64, "{nodes}: {difference}");
         }
     }
 }

@@ -38,8 +38,9 @@ fn plan(terrain: &Terrain, metric: &Metric, start: DVec2, goal: DVec2) -> Planne
     Planned { distance, route }
 }
 
-fn metrics() -> [Metric; 2] {
-    [Metric::Isotropic, Metric::Curvature(Default::default())]
+fn metrics() -> [Metric; 3] {
+    let difference = Metric::Difference(Default::default());
+    [Metric::Isotropic, Metric::Curvature(Default::default()), difference]
 }
 
 const N: usize = 81;
@@ -115,8 +116,12 @@ fn there_and_back_cost_the_same() {
         let (there, back) =
             (plan(&terrain, &metric, START, GOAL), plan(&terrain, &metric, GOAL, START));
         let (a, b) = (there.route.summary.cost, back.route.summary.cost);
-        // The curvature tensor has kinks: lines in it are found less sharply.
-        let agreement = if matches!(metric, Metric::Isotropic) { 1e-5 } else { 1e-3 };
+        // The curvature tensor has kinks, its changes jumps: lines in it are found less sharply.
+        let agreement = match metric {
+            Metric::Isotropic => 1e-5,
+            Metric::Difference(_) => 2e-3,
+            _ => 1e-3,
+        };
         assert!((a / b - 1.0).abs() < agreement, "{metric:?}: {a} there, {b} back");
     }
 }
@@ -154,6 +159,8 @@ fn stretched_cells_give_the_same_distances_at_the_same_places() {
         FitOptions { smoothing: ridgeway::Smoothing::Interpolate, ..FitOptions::default() };
     let control = Control::default();
     for metric in metrics() {
+        // Changes from node to node are a derivative more than curvature is.
+        let agreement = if matches!(metric, Metric::Difference(_)) { 0.08 } else { 0.03 };
         let [a, b] = [(&fine, 1.0), (&flat, 2.0)].map(|(terrain, stretch)| {
             let surface = HeightSurface::fit(terrain, &options, &control).unwrap();
             let field = metric.on(&surface, &Modifiers::default()).unwrap();
@@ -166,7 +173,7 @@ fn stretched_cells_give_the_same_distances_at_the_same_places() {
             for col in (0..161).step_by(20) {
                 let (a, b) = (a(col, row), b(col, row));
                 assert!(
-                    (a - b).abs() < 0.03 * a.max(b) + 1e-9,
+                    (a - b).abs() < agreement * a.max(b) + 1e-9,
                     "{metric:?} ({col}, {row}): {a} {b}"
                 );
             }

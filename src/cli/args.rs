@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec2;
-use ridgeway::{Accuracy, Degree, Delta, FitOptions, Smoothing, Solver};
+use ridgeway::metric::{Difference, DifferenceForm};
+use ridgeway::{Accuracy, Degree, Delta, FitOptions, Metric, Smoothing, Solver};
 
 use crate::places::Place;
 
@@ -237,7 +238,7 @@ pub(crate) struct CompareArgs {
     /// Where to go.
     #[arg(long, value_name = "PLACE", allow_hyphen_values = true)]
     pub(crate) goal: Place,
-    /// The metrics [default: isotropic,curvature, and tensor with --tensor].
+    /// The metrics [default: isotropic,curvature,difference, and tensor with --tensor].
     #[arg(long, value_enum, value_name = "METRIC", value_delimiter = ',')]
     pub(crate) metrics: Vec<MetricName>,
     /// The folder to write: routes.geojson, profile.csv, summary.json, map.png.
@@ -340,14 +341,22 @@ impl FitArgs {
     }
 }
 
+/// A flag's value, `None` for `auto`. Called `Option`, clap would take it for a flag that may be left out.
+pub(crate) type OrAuto<T> = Option<T>;
+
 /// What a metric needs to know, and what composes with all of them.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Metric")]
 pub(crate) struct MetricArgs {
     /// How much straight, uncurved ground costs beside curved: `auto` (a tenth of the
-    /// root-mean-square curvature), `auto:SHARE`, or a curvature in 1/m.
+    /// root-mean-square curvature; all of it in the curvature tensors that the difference metrics compare), `auto:SHARE`, or a
+    /// curvature in 1/m.
     #[arg(long, value_name = "1/M", default_value = "auto", value_parser = delta, allow_hyphen_values = true)]
-    pub(crate) delta: Delta,
+    pub(crate) delta: OrAuto<Delta>,
+    /// How much ground of even shape costs beside ground where the curvature changes, on the difference metrics: `auto` (the
+    /// square of the mean rate of change), `auto:SHARE` of it, or a number in their own unit (none; m² if literal).
+    #[arg(long, value_name = "VALUE", default_value = "auto", value_parser = difference_delta, allow_hyphen_values = true)]
+    pub(crate) difference_delta: OrAuto<Delta>,
     /// Aversion to grade: β of the term β∇z∇zᵀ added to the metric.
     ///
     /// On the isotropic metric going up or down a grade s costs √(1 + s² + βs²) per plan metre: with
@@ -381,6 +390,19 @@ impl MetricArgs {
         };
         Solver { accuracy, ..Solver::default() }
     }
+
+    pub(crate) fn curvature(&self) -> Metric {
+        Metric::Curvature(self.delta.unwrap_or_default())
+    }
+
+    pub(crate) fn difference(&self, form: DifferenceForm) -> Metric {
+        let default = Difference::default();
+        Metric::Difference(Difference {
+            form,
+            curvature_delta: self.delta.unwrap_or(default.curvature_delta),
+            delta: self.difference_delta.unwrap_or(default.delta),
+        })
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -406,6 +428,10 @@ pub(crate) enum MetricName {
     Isotropic,
     /// The curvature tensor, in AG units.
     Curvature,
+    /// The rate at which the curvature tensor changes, in AG units.
+    Difference,
+    /// The same from cell to cell, as the paper prints it: depends on the cell size and the grid's directions.
+    DifferenceLiteral,
     /// The tensors of --tensor, in AG units.
     Tensor,
 }
@@ -519,14 +545,20 @@ fn smoothing(text: &str) -> Result<Smoothing, String> {
     Ok(if metres == 0.0 { Smoothing::Interpolate } else { Smoothing::Cutoff(metres) })
 }
 
-fn delta(text: &str) -> Result<Delta, String> {
-    const EXPECTED: &str = "auto, auto:SHARE, or a curvature above 0 in 1/m such as 0.001";
+fn delta(text: &str) -> Result<OrAuto<Delta>, String> {
+    auto_or(text, "auto, auto:SHARE, or a curvature above 0 in 1/m such as 0.001")
+}
+
+fn difference_delta(text: &str) -> Result<OrAuto<Delta>, String> {
+    auto_or(text, "auto, auto:SHARE, or a number above 0")
+}
+
+fn auto_or(text: &str, expected: &str) -> Result<OrAuto<Delta>, String> {
+    let positive = |text| number(text, |v| v > 0.0, expected);
     match text.strip_prefix("auto") {
-        Some("") => Ok(Delta::default()),
-        Some(share) => {
-            number(share.strip_prefix(':').unwrap_or(""), |v| v > 0.0, EXPECTED).map(Delta::Auto)
-        }
-        None => number(text, |v| v > 0.0, EXPECTED).map(Delta::Absolute),
+        Some("") => Ok(None),
+        Some(share) => positive(share.strip_prefix(':').unwrap_or("")).map(Delta::Auto).map(Some),
+        None => positive(text).map(Delta::Absolute).map(Some),
     }
 }
 
@@ -550,9 +582,9 @@ mod tests {
         assert!(
             smoothing("-3").is_err() && smoothing("cells").is_err() && smoothing("NaN").is_err()
         );
-        assert_eq!(delta("auto"), Ok(Delta::Auto(0.1)));
-        assert_eq!(delta("auto:0.05"), Ok(Delta::Auto(0.05)));
-        assert_eq!(delta("1e-3"), Ok(Delta::Absolute(1e-3)));
+        assert_eq!(delta("auto"), Ok(None));
+        assert_eq!(delta("auto:0.05"), Ok(Some(Delta::Auto(0.05))));
+        assert_eq!(delta("1e-3"), Ok(Some(Delta::Absolute(1e-3))));
         assert!(delta("0").is_err() && delta("autos").is_err() && delta("inf").is_err());
         assert_eq!(size("30x20"), Ok((30, 20)));
         assert!(size("30").is_err() && size("0x3").is_err() && size("-1x3").is_err());

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use ridgeway::metric::DifferenceForm;
 use ridgeway::terrain::read_bands;
 use ridgeway::{
     Control, DistanceMap, Error, GridFrame, HeightSurface, Metric, MetricField, Modifiers, Result,
@@ -93,7 +94,11 @@ impl<'a> Journey<'a> {
     pub(crate) fn field(&self, name: MetricName) -> Result<MetricField<'_>> {
         let metric = match (name, &self.tensors) {
             (MetricName::Isotropic, _) => Metric::Isotropic,
-            (MetricName::Curvature, _) => Metric::Curvature(self.args.metric.delta),
+            (MetricName::Curvature, _) => self.args.metric.curvature(),
+            (MetricName::Difference, _) => self.args.metric.difference(DifferenceForm::Rate),
+            (MetricName::DifferenceLiteral, _) => {
+                self.args.metric.difference(DifferenceForm::Literal)
+            }
             (MetricName::Tensor, Some(tensors)) => Metric::Tensor(Arc::clone(tensors)),
             (MetricName::Tensor, None) => {
                 return Err(Error::usage("the metric `tensor` needs --tensor FILE.tif"));
@@ -171,7 +176,14 @@ impl<'a> Journey<'a> {
             |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let metrics: Vec<_> = fields
             .iter()
-            .map(|f| json!({ "name": f.name(), "unit": f.unit(), "delta_per_m": f.delta() }))
+            .map(|f| {
+                json!({
+                    "name": f.name(),
+                    "unit": f.unit(),
+                    "delta_per_m": f.delta(),
+                    "difference_delta": f.difference_delta(),
+                })
+            })
             .collect();
         json!({
             "metrics": metrics,

@@ -456,6 +456,7 @@ mod tests {
                 for metric in [
                     Metric::Isotropic,
                     Metric::Curvature(Default::default()),
+                    Metric::Difference(Default::default()),
                     Metric::Tensor(tensors),
                 ] {
                     for climb_weight in [0.0, 30.0] {

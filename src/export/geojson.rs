@@ -173,6 +173,7 @@ pub(super) mod tests {
             summary: Summary {
                 metric: "isotropic".into(),
                 delta_per_m: None,
+                difference_delta: None,
                 cost: 1.0,
                 cost_unit: "m".into(),
                 length_m: 10.0,

@@ -39,7 +39,7 @@ impl SpeedBlock {
     }
 }
 
-/// The tensors of a metric at the nodes of a block; those of the user are in `speeds` already.
+/// The tensors of a metric at the nodes of a block; those known at the nodes are in `speeds` already.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -61,7 +61,7 @@ pub(super) fn of_jets(speed: &Speed, climb_weight: f64, speeds: &mut SpeedBlock)
                 }
             }
         }
-        Speed::Tensor(_) => {}
+        Speed::Difference { .. } | Speed::Tensor(_) => {}
     }
     if climb_weight > 0.0 {
         for row in 0..BLOCK {

@@ -8,13 +8,16 @@
 //! |---|---|---|
 //! | [`Metric::Isotropic`] | `G⁻¹`, the inverse first fundamental form | m |
 //! | [`Metric::Curvature`] | `Σ 1/(δ+\|κ_i\|) w_i w_iᵀ` (Seong, Jeong, Cohen 2008, equation 4) | AG units, `m·√(1/m)` |
+//! | [`Metric::Difference`] | `Σ 1/(δ+γ_i) q_i q_iᵀ` (equations 5 and 6) | AG units, `m` |
 //! | [`Metric::Tensor`] | the user's | units of the tensor |
 //!
 //! On the curvature metric a step along a direction of high normal curvature is dear, so routes turn
-//! away from changing slopes and follow valleys, ridges and hillsides.
+//! away from changing slopes and follow valleys, ridges and hillsides. On the difference metric a step is dear where the
+//! curvature changes along it, so distances are short within a part of even shape and long from one part to the next.
 
 mod block;
 mod curvature;
+mod difference;
 mod space;
 mod sym2;
 
@@ -24,10 +27,11 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 pub(crate) use self::block::SpeedBlock;
+pub use self::difference::{Change, Difference, DifferenceForm, neighbour_differences};
 pub use self::space::SurfaceMetric;
 pub use self::sym2::Sym2;
 use crate::surface::BLOCK;
-use crate::{Error, HeightJet, HeightSurface, ParametricSurface, Result};
+use crate::{Control, Error, HeightJet, HeightSurface, ParametricSurface, Result};
 
 /// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +90,9 @@ pub enum Metric {
     Isotropic,
     /// The curvature tensor CT: `D = Σ 1/(δ+|κ_i|) w_i w_iᵀ`.
     Curvature(Delta),
+    /// The difference curvature tensor DC: `D = Σ 1/(δ+γ_i) q_i q_iᵀ`, from how CT changes. Computed at the nodes when the
+    /// metric is bound; between them `D` is bilinear.
+    Difference(Difference),
     /// The user's own speed tensors `D` at the nodes, row-major from the north-west, in ground axes
     /// (x east, y north); on a [`ParametricSurface`] in grid coordinates (column, row). A node whose tensor is not finite is a barrier. Between nodes `D` is bilinear.
     Tensor(Arc<[Sym2]>),
@@ -122,7 +129,27 @@ pub struct MetricField<'a> {
 enum Speed {
     Isotropic,
     Curvature { delta: f64 },
+    Difference { form: DifferenceForm, curvature_delta: f64, delta: f64, tensors: Arc<[Sym2]> },
     Tensor(Arc<[Sym2]>),
+}
+
+impl Speed {
+    /// The tensors at the nodes, where it is known by them.
+    fn tensors(&self) -> Option<&[Sym2]> {
+        match self {
+            Self::Isotropic | Self::Curvature { .. } => None,
+            Self::Difference { tensors, .. } | Self::Tensor(tensors) => Some(tensors),
+        }
+    }
+
+    /// `δ` of the curvature tensor, 1/m.
+    fn delta(&self) -> Option<f64> {
+        match *self {
+            Self::Curvature { delta } => Some(delta),
+            Self::Difference { curvature_delta, .. } => Some(curvature_delta),
+            Self::Isotropic | Self::Tensor(_) => None,
+        }
+    }
 }
 
 impl Metric {
@@ -141,6 +168,12 @@ impl Metric {
             Self::Curvature(delta) => {
                 let delta = delta.resolve(|| surface.rms_curvature(), extent(surface))?;
                 Speed::Curvature { delta }
+            }
+            Self::Difference(difference) => {
+                let frame = surface.frame();
+                let ground = |row: usize| frame.spacing(row as f64) * DVec2::new(1.0, -1.0);
+                let scale = (surface.rms_curvature(), extent(surface));
+                difference.speed(surface, scale, ground, &Control::default())?
             }
             Self::Tensor(tensors) => {
                 check_tensors(surface, tensors)?;
@@ -234,7 +267,7 @@ fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> 
         && barrier.is_none()
         && steepest.is_none()
         && modifiers.cost.is_none()
-        && !matches!(speed, Speed::Tensor(_));
+        && speed.tensors().is_none();
     if all_open {
         return Ok(Vec::new());
     }
@@ -252,7 +285,7 @@ fn open_nodes(surface: &HeightSurface, speed: &Speed, modifiers: &Modifiers) -> 
                 && !barrier.is_some_and(|b| b[i])
                 && modifiers.cost.as_ref().is_none_or(|cost| cost[i].is_finite())
                 && !jets.as_ref().is_some_and(|(jets, limit)| too_steep(&jets[col], *limit))
-                && !matches!(speed, Speed::Tensor(d) if !d[i].is_positive_definite());
+                && speed.tensors().is_none_or(|d| d[i].is_positive_definite());
         }
     });
     Ok(open)
@@ -265,18 +298,20 @@ impl<'a> MetricField<'a> {
         self.surface
     }
 
-    /// `isotropic`, `curvature` or `tensor`.
+    /// `isotropic`, `curvature`, `difference`, `difference-literal` or `tensor`.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self.speed {
             Speed::Isotropic => "isotropic",
             Speed::Curvature { .. } => "curvature",
+            Speed::Difference { form: DifferenceForm::Rate, .. } => "difference",
+            Speed::Difference { form: DifferenceForm::Literal, .. } => "difference-literal",
             Speed::Tensor(_) => "tensor",
         }
     }
 
     /// Unit of the distance: `m` for isotropic without climb weight and cost, `AG units` (anisotropic geodesic)
-    /// otherwise. For the curvature metric an AG unit is `m·√(1/m)`.
+    /// otherwise. For the curvature metric an AG unit is `m·√(1/m)`, for the difference metric `m`, for its literal form `m²`.
     #[must_use]
     pub fn unit(&self) -> &'static str {
         match self.speed {
@@ -285,11 +320,17 @@ impl<'a> MetricField<'a> {
         }
     }
 
-    /// `δ` in 1/m, for the curvature tensor.
+    /// `δ` in 1/m of the curvature tensor, also of the one whose changes make the difference tensor.
     #[must_use]
     pub fn delta(&self) -> Option<f64> {
+        self.speed.delta()
+    }
+
+    /// `δ` of the difference tensor, in the unit of its `γ`.
+    #[must_use]
+    pub fn difference_delta(&self) -> Option<f64> {
         match self.speed {
-            Speed::Curvature { delta } => Some(delta),
+            Speed::Difference { delta, .. } => Some(delta),
             _ => None,
         }
     }
@@ -313,7 +354,7 @@ impl<'a> MetricField<'a> {
         let frame = self.surface.frame();
         self.surface.block_jets(col, row, &mut speeds.jets);
         let (cols, rows) = (BLOCK.min(frame.cols() - col), BLOCK.min(frame.rows() - row));
-        if let Speed::Tensor(tensors) = &self.speed {
+        if let Some(tensors) = self.speed.tensors() {
             for j in 0..rows {
                 let start = frame.index(col, row + j);
                 for (i, d) in tensors[start..start + cols].iter().enumerate() {
@@ -349,7 +390,7 @@ impl<'a> MetricField<'a> {
         let speed = match &self.speed {
             Speed::Isotropic => curvature::isotropic(jet),
             Speed::Curvature { delta } => curvature::curvature(jet, *delta),
-            Speed::Tensor(tensors) => {
+            Speed::Difference { tensors, .. } | Speed::Tensor(tensors) => {
                 let d = tensor(tensors);
                 (d, d.det())
             }

@@ -30,6 +30,11 @@ impl Metric {
                 let delta = delta.resolve(|| measures.rms_curvature, measures.area.sqrt())?;
                 Speed::Curvature { delta }
             }
+            Self::Difference(difference) => {
+                let measures = surface.measures();
+                let scale = (measures.rms_curvature, measures.area.sqrt());
+                difference.speed(surface, scale, |_| DVec2::ONE, &Control::default())?
+            }
             Self::Tensor(tensors) => {
                 check_tensors(surface, tensors)?;
                 Speed::Tensor(tensors.clone())
@@ -52,21 +57,18 @@ impl<'a> SurfaceMetric<'a> {
         if matches!(self.speed, Speed::Isotropic) { "m" } else { "AG units" }
     }
 
-    /// `δ` in 1/m, for the curvature tensor.
+    /// `δ` in 1/m of the curvature tensor, as [`MetricField::delta`](super::MetricField::delta).
     #[must_use]
     pub fn delta(&self) -> Option<f64> {
-        match self.speed {
-            Speed::Curvature { delta } => Some(delta),
-            _ => None,
-        }
+        self.speed.delta()
     }
 
     /// `D` at grid coordinates; `None` where the surface is degenerate.
     #[must_use]
     pub fn speed(&self, at: DVec2) -> Option<Sym2> {
-        let speed = match &self.speed {
-            Speed::Tensor(tensors) => self.bilinear(tensors, at),
-            _ => self.speed_of(&self.surface.space_jet(at)),
+        let speed = match self.speed.tensors() {
+            Some(tensors) => self.bilinear(tensors, at),
+            None => self.speed_of(&self.surface.space_jet(at)),
         };
         speed.is_positive_definite().then_some(speed)
     }
@@ -82,9 +84,9 @@ impl<'a> SurfaceMetric<'a> {
             .into_par_iter()
             .map(|row| {
                 control.check()?;
-                Ok(match &self.speed {
-                    Speed::Tensor(tensors) => tensors[row * cols..(row + 1) * cols].to_vec(),
-                    _ => self
+                Ok(match self.speed.tensors() {
+                    Some(tensors) => tensors[row * cols..(row + 1) * cols].to_vec(),
+                    None => self
                         .surface
                         .row_space_jets(row)
                         .iter()
@@ -183,7 +185,8 @@ mod tests {
             (0..1200).map(|i| Sym2::new(2.0 + f64::from(i).sin(), 0.5, 1.0)).collect();
         let control = Control::default();
         for surface in surfaces() {
-            for metric in [Metric::Isotropic, Metric::Curvature(Delta::default())] {
+            let difference = Metric::Difference(Default::default());
+            for metric in [Metric::Isotropic, Metric::Curvature(Delta::default()), difference] {
                 let fast = metric.on(&surface, &Modifiers::default()).unwrap();
                 let general = metric.on_surface(&surface).unwrap();
                 assert_eq!((fast.unit(), fast.delta()), (general.unit(), general.delta()));

@@ -19,6 +19,8 @@ impl Rgb {
     pub const BLUE: Self = Self(0x1a, 0x6f, 0xdf);
     /// Red-orange, for the curvature metric.
     pub const ORANGE: Self = Self(0xd7, 0x30, 0x1f);
+    /// Magenta, for the difference metric.
+    pub const MAGENTA: Self = Self(0xb0, 0x2a, 0x8f);
     /// Green, for starts (with the letter S).
     pub const GREEN: Self = Self(0x1b, 0x78, 0x37);
     /// Purple, for goals (with the letter G).

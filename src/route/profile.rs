@@ -14,6 +14,9 @@ pub struct Summary {
     /// `δ` of the curvature tensor, 1/m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub delta_per_m: Option<f64>,
+    /// `δ` of the difference tensor, in the unit of its `γ`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub difference_delta: Option<f64>,
     /// Length of the line under the route's own metric.
     pub cost: f64,
     /// Unit of the cost: `m` or `AG units`.
@@ -125,6 +128,7 @@ impl Summary {
         let mut summary = Self {
             metric: metric.name().to_owned(),
             delta_per_m: metric.delta(),
+            difference_delta: metric.difference_delta(),
             cost: metric.length(line),
             cost_unit: metric.unit().to_owned(),
             length_m: 0.0,

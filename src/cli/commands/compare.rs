@@ -66,7 +66,12 @@ const EXPLANATION: &str =
 fn metrics(args: &CompareArgs, journey: &Journey<'_>) -> Vec<MetricName> {
     let mut names = args.metrics.clone();
     if names.is_empty() {
-        names = vec![MetricName::Isotropic, MetricName::Curvature, journey.default_metric()];
+        names = vec![
+            MetricName::Isotropic,
+            MetricName::Curvature,
+            MetricName::Difference,
+            journey.default_metric(),
+        ];
     }
     let mut once = Vec::new();
     for name in names {

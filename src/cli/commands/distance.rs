@@ -196,6 +196,7 @@ fn report(
             "metric": field.name(),
             "unit": unit,
             "delta_per_m": field.delta(),
+            "difference_delta": field.difference_delta(),
             "cells": nodes,
             "reached": reached,
             "distance": statistics,

@@ -121,6 +121,7 @@ fn colour(metric: &str) -> Rgb {
     match metric {
         "isotropic" => Rgb::BLUE,
         "curvature" => Rgb::ORANGE,
+        "difference" => Rgb::MAGENTA,
         _ => Rgb::INK,
     }
 }
