@@ -546,3 +546,87 @@ fn bad_flags_are_explained() {
         "--goal huts.geojson holds 2 points; compare takes one goal",
     );
 }
+
+#[test]
+fn segment_writes_labels_polygons_and_a_picture() {
+    let folder = Folder::new();
+    let text = folder.good(
+        "segment range.tif --levels 2 -o regions.tif -o regions.geojson -o regions.png --threads 2",
+    );
+    assert!(text.contains("level 2") && text.contains("wrote regions.png\n"), "{text}");
+    assert!(is_tiff(&folder.path("regions.tif")) && is_png(&folder.path("regions.png")));
+    let raster = ridgeway::terrain::read_bands(folder.path("regions.tif")).unwrap();
+    assert_eq!(raster.bands.len(), 2);
+    let file = folder.json("regions.geojson");
+    let features = file["features"].as_array().unwrap();
+    let mut cells = [0, 0];
+    for feature in features {
+        let properties = &feature["properties"];
+        let level = properties["level"].as_u64().unwrap() as usize;
+        let region = properties["region"].as_f64().unwrap();
+        let nodes = properties["nodes"].as_u64().unwrap();
+        let labelled = raster.bands[level - 1].iter().filter(|label| **label == region).count();
+        assert_eq!(nodes as usize, labelled);
+        cells[level - 1] += nodes;
+        assert_eq!(properties["parent"].is_null(), level == 1);
+        assert_eq!(properties["signature"].as_array().unwrap().len(), 4);
+        assert!(properties["area_m2"].as_f64().unwrap() >= 900.0 * nodes as f64);
+        let kind = feature["geometry"]["type"].as_str().unwrap();
+        assert!(kind == "Polygon" || kind == "MultiPolygon");
+    }
+    assert_eq!(cells, [61 * 41; 2]);
+    assert_eq!(file["provenance"]["software"], format!("ridgeway {}", env!("CARGO_PKG_VERSION")));
+    // The same on one thread.
+    folder.good("segment range.tif --levels 2 -o again.tif --threads 1 -q");
+    let again = ridgeway::terrain::read_bands(folder.path("again.tif")).unwrap();
+    assert_eq!(again.bands, raster.bands);
+}
+
+#[test]
+fn segment_takes_radii_metrics_and_merges() {
+    let folder = Folder::new();
+    let regions = |options: &str| {
+        let out = folder.good(&format!("segment range.tif --json -q {options}"));
+        let json: Value = serde_json::from_str(&out).unwrap();
+        json["regions"].as_array().unwrap().len()
+    };
+    assert_eq!(regions("--epsilon 1e6"), 1);
+    let many = regions("--epsilon 5");
+    assert!(many > 5);
+    assert!(regions("--epsilon 20,5") > many);
+    assert!(regions("--epsilon 5 --merge 0.3") <= many);
+    assert_eq!(regions("--epsilon 5 --merge 1"), 1);
+    assert!(regions("--metric difference") > 1);
+    // Voids split the terrain.
+    let split = folder.good("segment split.asc --json -q --smooth 0 --epsilon 1e9");
+    let json: Value = serde_json::from_str(&split).unwrap();
+    assert_eq!(json["regions"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn segment_refuses_what_makes_no_sense() {
+    let folder = Folder::new();
+    folder.bad(
+        "segment range.tif --epsilon 5,20",
+        2,
+        "the values of epsilon must fall from level to level",
+    );
+    folder.bad(
+        "segment range.tif --epsilon 20,5 --levels 1",
+        2,
+        "1 levels and 2 values of epsilon; there must be a level for each, and at least one",
+    );
+    folder.bad(
+        "segment range.tif --epsilon 0",
+        2,
+        "invalid value '0' for '--epsilon <VALUE>': expected a number above 0",
+    );
+    folder.bad(
+        "segment range.tif -o regions.gpx",
+        2,
+        "regions.gpx: cannot tell the format from the name; end it in .geojson, .json, .tif, .tiff, .png",
+    );
+    folder.good("segment range.tif -o regions.tif -q");
+    let again = folder.run("segment range.tif -o regions.tif");
+    assert!(again.code == 2 && again.err.contains("regions.tif"), "{again:?}");
+}
