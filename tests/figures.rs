@@ -1,11 +1,17 @@
 //! The figures of Seong, Jeong and Cohen (2008): what each of them claims.
 
+#[allow(dead_code, reason = "the example uses the rest")]
+#[path = "../examples/figure_6/four_bumps.rs"]
+mod four_bumps;
 #[path = "../examples/figures/half_cylinders.rs"]
 mod half_cylinders;
 #[path = "../examples/figures/parametrisations.rs"]
 mod parametrisations;
 #[path = "../examples/figures/shapes.rs"]
 mod shapes;
+#[allow(dead_code, reason = "the example uses the rest")]
+#[path = "../examples/figure_3/waves.rs"]
+mod waves;
 
 mod figure_5 {
     use glam::DVec2;
@@ -62,5 +68,70 @@ mod figure_8 {
             // Within a column.
             assert!(difference >= 1.0 - 1.0 / nodes as f64, "{nodes}: {difference}");
         }
+    }
+}
+
+mod figure_3 {
+    use ridgeway::region::{SegmentOptions, Segmentation, cluster, gaussian_ranks, statistics};
+
+    use super::waves::{SIDE, field, surface, terrain};
+
+    #[test]
+    fn a_cluster_of_flat_ground_is_larger() {
+        let surface = surface(&terrain().unwrap()).unwrap();
+        let field = field(&surface).unwrap();
+        let size = |col| cluster(&field, [col, SIDE / 2], 12.0, &Default::default()).unwrap().len();
+        let (flat, curved) = (size(SIDE / 4), size(3 * SIDE / 4));
+        assert!(
+            flat > 4 * curved && curved > 20,
+            "{flat} nodes of flat ground, {curved} of curved"
+        );
+    }
+
+    #[test]
+    fn regions_of_one_radius_adapt_to_the_curvature() {
+        let surface = surface(&terrain().unwrap()).unwrap();
+        let options = SegmentOptions { epsilons: vec![12.0], ..SegmentOptions::default() };
+        let cut = Segmentation::of(
+            &field(&surface).unwrap(),
+            &gaussian_ranks(&surface),
+            &options,
+            &Default::default(),
+        )
+        .unwrap();
+        let measures = statistics(&surface, &cut.levels[0]);
+        let mean_area = |curved: bool| {
+            let bent = |m: f64| m > 1e-3;
+            let areas = measures.iter().filter(|m| bent(m.mean_abs_curvature_per_m[0]) == curved);
+            areas.clone().map(|m| m.area_m2).sum::<f64>() / areas.count() as f64
+        };
+        assert!(mean_area(false) > 2.0 * mean_area(true), "{measures:#?}");
+    }
+}
+
+mod figure_6 {
+    use super::four_bumps::{
+        agreement, curvatures, marching_between_walls, segmentation, surface, terrain,
+        total_curvature_watershed,
+    };
+
+    #[test]
+    fn four_bumps_are_four_regions_whatever_the_order_of_the_seeds() {
+        let surface = surface(&terrain().unwrap()).unwrap();
+        for (seed, perturbation) in
+            [0.0, 0.005, 0.01, 0.02].into_iter().cycle().take(16).enumerate()
+        {
+            let cut = segmentation(&surface, perturbation, seed as u64).unwrap();
+            assert_eq!(cut.levels[0].regions.len(), 4, "{perturbation} {seed}");
+            let agreement = agreement(&cut);
+            assert!(agreement > 0.995, "{perturbation} {seed}: {agreement}");
+        }
+    }
+
+    #[test]
+    fn older_methods_find_nine_and_five() {
+        let (gaussian, larger) = curvatures(&surface(&terrain().unwrap()).unwrap());
+        assert_eq!(total_curvature_watershed(&gaussian), 9);
+        assert_eq!(marching_between_walls(&larger), 5);
     }
 }
