@@ -6,9 +6,10 @@
 //! with a smaller `ε`. (Seong, Jeong and Cohen, SMI 2008, definition 4.1 and section 5.1.)
 //!
 //! Distances come from a [`TensorField`](crate::eikonal::TensorField) alone, whatever surface and metric it is of;
-//! [`statistics`] measures the regions on a [`ParametricSurface`](crate::ParametricSurface).
+//! [`signatures`] put the shapes of regions into numbers and [`matches`] finds like ones; [`statistics`] measures the regions on a [`ParametricSurface`](crate::ParametricSurface).
 
 mod clusters;
+mod matching;
 mod merging;
 mod outline;
 mod segmentation;
@@ -16,6 +17,7 @@ mod signature;
 mod statistics;
 
 pub use self::clusters::{cluster, difference_ranks, gaussian_ranks};
+pub use self::matching::{Match, matches, matches_within};
 pub use self::outline::{Polygon, outlines};
 pub use self::segmentation::{Level, Region, SegmentOptions, Segmentation};
 pub use self::signature::{Neighbours, Signature, signatures};

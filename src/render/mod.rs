@@ -6,6 +6,7 @@
 mod canvas;
 mod field;
 mod map;
+mod plot;
 mod regions;
 mod relief;
 mod sheet;
@@ -15,5 +16,6 @@ mod text;
 pub use self::canvas::{Rgb, png};
 pub use self::field::{FieldPicture, Gradient};
 pub use self::map::{IsolineLayer, MapPicture, RouteLayer};
+pub use self::plot::{LogPlot, Mark, pair_colour};
 pub use self::regions::{RegionLayer, contrasting_colours};
 pub use self::surface::{SurfacePicture, beside};
