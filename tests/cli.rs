@@ -630,3 +630,70 @@ fn segment_refuses_what_makes_no_sense() {
     let again = folder.run("segment range.tif -o regions.tif");
     assert!(again.code == 2 && again.err.contains("regions.tif"), "{again:?}");
 }
+
+#[test]
+fn match_finds_like_regions_of_one_terrain() {
+    let folder = Folder::new();
+    folder.good("synth four-bumps --size 101x101 -o four.tif");
+    let text = folder.good("match four.tif --smooth 0 -o like");
+    assert!(text.contains("four.tif: 4 regions\n"), "{text}");
+    assert!(text.ends_with("wrote like/matches.json, like/regions.png, like/signatures.png\n"));
+    assert!(
+        is_png(&folder.path("like/regions.png")) && is_png(&folder.path("like/signatures.png"))
+    );
+    let found = folder.json("like/matches.json");
+    assert_eq!(found["surfaces"][0]["regions"].as_array().unwrap().len(), 4);
+    let pairs = found["matches"].as_array().unwrap();
+    assert_eq!(pairs.len(), 2);
+    for pair in pairs {
+        assert!(pair["unlikeness"].as_f64().unwrap() < 0.05, "{pair}");
+        assert!((pair["size_ratio"].as_f64().unwrap() - 1.0).abs() < 0.05, "{pair}");
+    }
+}
+
+/// A bent sheet, 4 × 3 m, as a NURBS surface of degree 2 and 1.
+const SHEET: &str = r#"{"degree":[2,1],"knots":[[0,0,0,1,1,1],[0,0,1,1]],
+    "points":[[[0,0,0,1],[2,0,3,1],[4,0,0,1]],[[0,3,0,1],[2,3,1,1],[4,3,0,1]]]}"#;
+
+#[test]
+fn match_compares_terrain_and_surfaces_on_any_metric() {
+    let folder = Folder::new();
+    folder.write("sheet.json", SHEET);
+    for metric in ["curvature", "difference", "isotropic"] {
+        let line = format!("match range.tif sheet.json --nodes 30x20 --metric {metric} --json -q");
+        let json: Value = serde_json::from_str(&folder.good(&line)).unwrap();
+        let counts = [0, 1].map(|i| json["surfaces"][i]["regions"].as_array().unwrap().len());
+        let pairs = json["matches"].as_array().unwrap();
+        assert_eq!(pairs.len(), counts[0].min(counts[1]));
+        let seed = |i: usize| json["surfaces"][i]["regions"][0]["seed"].as_array().unwrap().len();
+        assert_eq!([seed(0), seed(1)], [2, 3]);
+    }
+    // A surface and itself: each region is its own match.
+    let json = folder.good("match sheet.json sheet.json --levels 2 --nodes 30x20 --json --sized");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    for pair in json["matches"].as_array().unwrap() {
+        assert_eq!(pair["unlikeness"], 0.0);
+        assert_eq!(pair["size_ratio"], 1.0);
+    }
+}
+
+#[test]
+fn match_refuses_what_it_cannot_compare() {
+    let folder = Folder::new();
+    folder.bad(
+        "match range.tif --metric tensor",
+        2,
+        "match needs a metric that knows nothing of the grid: curvature, difference or isotropic",
+    );
+    folder.write("sheet.json", SHEET);
+    folder.bad(
+        "match sheet.json --nodes 1x20",
+        2,
+        "1 nodes in the first direction of the surface; between 2 and 100000 are possible",
+    );
+    assert_eq!(folder.run("match range.tif plain.tif range.tif").code, 2);
+    assert_eq!(folder.run("match nowhere.json").code, 3);
+    folder.good("match plain.tif -o like -q");
+    let again = folder.run("match plain.tif -o like");
+    assert!(again.code == 2 && again.err.contains("matches.json"), "{again:?}");
+}

@@ -53,6 +53,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Cut the terrain into regions of like shape; their borders fall on ridges and valleys.
     Segment(SegmentArgs),
+    /// Find regions of like shape on two surfaces, or on one.
+    Match(MatchArgs),
     /// Draw a map of a DEM, with routes if asked.
     Render(RenderArgs),
     /// Print a completion script for a shell.
@@ -288,6 +290,41 @@ pub(crate) struct SegmentArgs {
     pub(crate) merge: Option<f64>,
     #[command(flatten)]
     pub(crate) ground: GroundArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each surface is cut into regions, as by `segment`. What tells regions apart is how the curvature tensor varies
+over them, in four numbers that know nothing of place, direction, size or grid. The two regions most alike are
+matched first, then the two most alike of the others.
+
+Examples:
+  ridgeway match valley.tif other.tif -o matches
+  ridgeway match letter.json --levels 2 --nodes 100x200")]
+pub(crate) struct MatchArgs {
+    /// One or two surfaces: DEMs, or NURBS surfaces in .json files.
+    #[arg(required = true, num_args = 1..=2, value_name = "SURFACE")]
+    pub(crate) surfaces: Vec<PathBuf>,
+    /// The metric of the regions.
+    #[arg(long, value_enum, value_name = "METRIC", default_value_t = MetricName::Curvature)]
+    pub(crate) metric: MetricName,
+    /// How often to cut, see `segment`.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub(crate) levels: u8,
+    /// Let sizes count beside shapes.
+    #[arg(long)]
+    pub(crate) sized: bool,
+    /// Nodes along the two parameters of a NURBS surface.
+    #[arg(long, value_name = "COLSxROWS", default_value = "200x200", value_parser = size)]
+    pub(crate) nodes: (usize, usize),
+    /// The folder to write: matches.json, regions.png (a matched pair in one colour), signatures.png (λ1 and λ2).
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace files that exist.
+    #[arg(long)]
+    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) fit: FitArgs,
 }
 
 #[derive(Debug, Args)]

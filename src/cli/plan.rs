@@ -324,7 +324,7 @@ fn check_grid(path: &Path, theirs: &GridFrame, ours: &GridFrame) -> Result<()> {
 }
 
 /// The command line, quoted for a shell.
-fn command_line() -> String {
+pub(crate) fn command_line() -> String {
     std::env::args_os()
         .enumerate()
         .map(|(i, word)| match i {
