@@ -46,6 +46,11 @@ impl Control {
         }
     }
 
+    /// The same for a part of the work that is not to be told of.
+    pub(crate) fn quiet(&self) -> Self {
+        Self { cancel: self.cancel.clone(), progress: None }
+    }
+
     /// # Errors
     /// [`Error::Cancelled`] once somebody cancelled.
     pub fn check(&self) -> Result<()> {

@@ -42,6 +42,8 @@
 //! * [`eikonal`]: [`Solver::solve`] solves `√(∇gᵀ D ∇g) = 1` from a [`StartRegion`] into a [`DistanceMap`].
 //! * [`route`]: [`route::trace`] descends on `g` from the goal; a [`Route`] carries its numbers; [`Comparison`] sets several
 //!   metrics side by side.
+//! * [`region`]: [`region::Segmentation`] cuts a surface into regions of like shape; [`region::signatures`] and
+//!   [`region::matches`] find like ones on other surfaces.
 //! * [`export`], [`render`]: files and pictures.
 //!
 //! # Units, frames, signs
@@ -71,6 +73,7 @@ mod error;
 pub mod export;
 mod grid;
 pub mod metric;
+pub mod region;
 pub mod render;
 pub mod route;
 pub mod surface;

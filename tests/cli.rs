@@ -546,3 +546,154 @@ fn bad_flags_are_explained() {
         "--goal huts.geojson holds 2 points; compare takes one goal",
     );
 }
+
+#[test]
+fn segment_writes_labels_polygons_and_a_picture() {
+    let folder = Folder::new();
+    let text = folder.good(
+        "segment range.tif --levels 2 -o regions.tif -o regions.geojson -o regions.png --threads 2",
+    );
+    assert!(text.contains("level 2") && text.contains("wrote regions.png\n"), "{text}");
+    assert!(is_tiff(&folder.path("regions.tif")) && is_png(&folder.path("regions.png")));
+    let raster = ridgeway::terrain::read_bands(folder.path("regions.tif")).unwrap();
+    assert_eq!(raster.bands.len(), 2);
+    let file = folder.json("regions.geojson");
+    let features = file["features"].as_array().unwrap();
+    let mut cells = [0, 0];
+    for feature in features {
+        let properties = &feature["properties"];
+        let level = properties["level"].as_u64().unwrap() as usize;
+        let region = properties["region"].as_f64().unwrap();
+        let nodes = properties["nodes"].as_u64().unwrap();
+        let labelled = raster.bands[level - 1].iter().filter(|label| **label == region).count();
+        assert_eq!(nodes as usize, labelled);
+        cells[level - 1] += nodes;
+        assert_eq!(properties["parent"].is_null(), level == 1);
+        assert_eq!(properties["signature"].as_array().unwrap().len(), 4);
+        assert!(properties["area_m2"].as_f64().unwrap() >= 900.0 * nodes as f64);
+        let kind = feature["geometry"]["type"].as_str().unwrap();
+        assert!(kind == "Polygon" || kind == "MultiPolygon");
+    }
+    assert_eq!(cells, [61 * 41; 2]);
+    assert_eq!(file["provenance"]["software"], format!("ridgeway {}", env!("CARGO_PKG_VERSION")));
+    // The same on one thread.
+    folder.good("segment range.tif --levels 2 -o again.tif --threads 1 -q");
+    let again = ridgeway::terrain::read_bands(folder.path("again.tif")).unwrap();
+    assert_eq!(again.bands, raster.bands);
+}
+
+#[test]
+fn segment_takes_radii_metrics_and_merges() {
+    let folder = Folder::new();
+    let regions = |options: &str| {
+        let out = folder.good(&format!("segment range.tif --json -q {options}"));
+        let json: Value = serde_json::from_str(&out).unwrap();
+        json["regions"].as_array().unwrap().len()
+    };
+    assert_eq!(regions("--epsilon 1e6"), 1);
+    let many = regions("--epsilon 5");
+    assert!(many > 5);
+    assert!(regions("--epsilon 20,5") > many);
+    assert!(regions("--epsilon 5 --merge 0.3") <= many);
+    assert_eq!(regions("--epsilon 5 --merge 1"), 1);
+    assert!(regions("--metric difference") > 1);
+    // Voids split the terrain.
+    let split = folder.good("segment split.asc --json -q --smooth 0 --epsilon 1e9");
+    let json: Value = serde_json::from_str(&split).unwrap();
+    assert_eq!(json["regions"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn segment_refuses_what_makes_no_sense() {
+    let folder = Folder::new();
+    folder.bad(
+        "segment range.tif --epsilon 5,20",
+        2,
+        "the values of epsilon must fall from level to level",
+    );
+    folder.bad(
+        "segment range.tif --epsilon 20,5 --levels 1",
+        2,
+        "1 levels and 2 values of epsilon; there must be a level for each, and at least one",
+    );
+    folder.bad(
+        "segment range.tif --epsilon 0",
+        2,
+        "invalid value '0' for '--epsilon <VALUE>': expected a number above 0",
+    );
+    folder.bad(
+        "segment range.tif -o regions.gpx",
+        2,
+        "regions.gpx: cannot tell the format from the name; end it in .geojson, .json, .tif, .tiff, .png",
+    );
+    folder.good("segment range.tif -o regions.tif -q");
+    let again = folder.run("segment range.tif -o regions.tif");
+    assert!(again.code == 2 && again.err.contains("regions.tif"), "{again:?}");
+}
+
+#[test]
+fn match_finds_like_regions_of_one_terrain() {
+    let folder = Folder::new();
+    folder.good("synth four-bumps --size 101x101 -o four.tif");
+    let text = folder.good("match four.tif --smooth 0 -o like");
+    assert!(text.contains("four.tif: 4 regions\n"), "{text}");
+    assert!(text.ends_with("wrote like/matches.json, like/regions.png, like/signatures.png\n"));
+    assert!(
+        is_png(&folder.path("like/regions.png")) && is_png(&folder.path("like/signatures.png"))
+    );
+    let found = folder.json("like/matches.json");
+    assert_eq!(found["surfaces"][0]["regions"].as_array().unwrap().len(), 4);
+    let pairs = found["matches"].as_array().unwrap();
+    assert_eq!(pairs.len(), 2);
+    for pair in pairs {
+        assert!(pair["unlikeness"].as_f64().unwrap() < 0.05, "{pair}");
+        assert!((pair["size_ratio"].as_f64().unwrap() - 1.0).abs() < 0.05, "{pair}");
+    }
+}
+
+/// A bent sheet, 4 × 3 m, as a NURBS surface of degree 2 and 1.
+const SHEET: &str = r#"{"degree":[2,1],"knots":[[0,0,0,1,1,1],[0,0,1,1]],
+    "points":[[[0,0,0,1],[2,0,3,1],[4,0,0,1]],[[0,3,0,1],[2,3,1,1],[4,3,0,1]]]}"#;
+
+#[test]
+fn match_compares_terrain_and_surfaces_on_any_metric() {
+    let folder = Folder::new();
+    folder.write("sheet.json", SHEET);
+    for metric in ["curvature", "difference", "isotropic"] {
+        let line = format!("match range.tif sheet.json --nodes 30x20 --metric {metric} --json -q");
+        let json: Value = serde_json::from_str(&folder.good(&line)).unwrap();
+        let counts = [0, 1].map(|i| json["surfaces"][i]["regions"].as_array().unwrap().len());
+        let pairs = json["matches"].as_array().unwrap();
+        assert_eq!(pairs.len(), counts[0].min(counts[1]));
+        let seed = |i: usize| json["surfaces"][i]["regions"][0]["seed"].as_array().unwrap().len();
+        assert_eq!([seed(0), seed(1)], [2, 3]);
+    }
+    // A surface and itself: each region is its own match.
+    let json = folder.good("match sheet.json sheet.json --levels 2 --nodes 30x20 --json --sized");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    for pair in json["matches"].as_array().unwrap() {
+        assert_eq!(pair["unlikeness"], 0.0);
+        assert_eq!(pair["size_ratio"], 1.0);
+    }
+}
+
+#[test]
+fn match_refuses_what_it_cannot_compare() {
+    let folder = Folder::new();
+    folder.bad(
+        "match range.tif --metric tensor",
+        2,
+        "match needs a metric that knows nothing of the grid: curvature, difference or isotropic",
+    );
+    folder.write("sheet.json", SHEET);
+    folder.bad(
+        "match sheet.json --nodes 1x20",
+        2,
+        "1 nodes in the first direction of the surface; between 2 and 100000 are possible",
+    );
+    assert_eq!(folder.run("match range.tif plain.tif range.tif").code, 2);
+    assert_eq!(folder.run("match nowhere.json").code, 3);
+    folder.good("match plain.tif -o like -q");
+    let again = folder.run("match plain.tif -o like");
+    assert!(again.code == 2 && again.err.contains("matches.json"), "{again:?}");
+}

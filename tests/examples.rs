@@ -101,3 +101,16 @@ fn the_problems_are_solved_to_first_order() {
         assert!(error["mean_relative"].as_f64().is_some_and(|mean| mean < most), "{report}");
     }
 }
+
+#[test]
+fn figures_of_regions_print_their_numbers_and_draw() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("an ASCII path").to_owned();
+    let printed = run("figure_6", &[&path("bumps.png")]);
+    assert!(printed.contains("\n0, 4, 1.0000\n") && printed.contains("walls, 5"), "{printed}");
+    let printed = run("figure_3", &[&path("")]);
+    assert!(printed.contains("level ground, 6"), "{printed}");
+    for name in ["bumps.png", "distance.png", "clusters.png"] {
+        assert!(std::fs::read(path(name)).expect(name).starts_with(b"\x89PNG"));
+    }
+}

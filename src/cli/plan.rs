@@ -95,9 +95,11 @@ impl<'a> Journey<'a> {
         let metric = match (name, &self.tensors) {
             (MetricName::Isotropic, _) => Metric::Isotropic,
             (MetricName::Curvature, _) => self.args.metric.curvature(),
-            (MetricName::Difference, _) => self.args.metric.difference(DifferenceForm::Rate),
+            (MetricName::Difference, _) => {
+                Metric::Difference(self.args.metric.difference(DifferenceForm::Rate))
+            }
             (MetricName::DifferenceLiteral, _) => {
-                self.args.metric.difference(DifferenceForm::Literal)
+                Metric::Difference(self.args.metric.difference(DifferenceForm::Literal))
             }
             (MetricName::Tensor, Some(tensors)) => Metric::Tensor(Arc::clone(tensors)),
             (MetricName::Tensor, None) => {
@@ -322,7 +324,7 @@ fn check_grid(path: &Path, theirs: &GridFrame, ours: &GridFrame) -> Result<()> {
 }
 
 /// The command line, quoted for a shell.
-fn command_line() -> String {
+pub(crate) fn command_line() -> String {
     std::env::args_os()
         .enumerate()
         .map(|(i, word)| match i {

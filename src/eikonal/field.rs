@@ -214,6 +214,36 @@ impl TensorField {
         Ok(self)
     }
 
+    /// The part of the field made of the tiles that hold the given columns and rows, and its first column and row. A periodic direction stays
+    /// whole, and stored units the same.
+    pub(crate) fn crop(&self, [cols, rows]: [Range<usize>; 2]) -> (Self, [usize; 2]) {
+        let periodic = self.tiling.periodic;
+        let tiles = |axis: usize, nodes: Range<usize>, all: usize| {
+            let nodes = if periodic[axis] { 0..all } else { nodes };
+            nodes.start / SIDE..nodes.end.div_ceil(SIDE)
+        };
+        let (across, down) = (tiles(0, cols, self.cols()), tiles(1, rows, self.rows()));
+        let count =
+            |tiles: &Range<usize>, all: usize| all.min(tiles.end * SIDE) - tiles.start * SIDE;
+        let (cols, rows) = (count(&across, self.cols()), count(&down, self.rows()));
+        let tiling = Tiling { periodic, ..Tiling::new(cols, rows) };
+        let row = |y: usize| &self.tiles[y * self.tiling.across..][across.clone()];
+        let tiles = down.clone().flat_map(row).cloned().collect();
+        (Self { tiling, tiles, ..*self }, [across.start * SIDE, down.start * SIDE])
+    }
+
+    /// Closes the nodes that `is_open` says no to, given column and row.
+    pub(crate) fn restrict(&mut self, is_open: impl Fn(usize, usize) -> bool) {
+        for row in 0..self.rows() {
+            for col in 0..self.cols() {
+                if !is_open(col, row) {
+                    let (tile, place) = self.tiling.place(col, row);
+                    self.tiles[tile].det[place] = 0.0;
+                }
+            }
+        }
+    }
+
     /// The field of the tensors that `sample` gives for the block whose first node is `(col, row)`, once the
     /// coordinates are stretched by `stretch`, one for each row.
     fn build(

@@ -1,4 +1,4 @@
-//! Routes and isolines as GeoJSON (RFC 7946): longitude and latitude on WGS84, heights in metres.
+//! Routes, isolines and regions as GeoJSON (RFC 7946): longitude and latitude on WGS84, heights in metres.
 
 use ::geojson::{Feature, FeatureCollection, GeometryValue, JsonObject, Position};
 use glam::{DVec2, DVec3};
@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::isolines::Isoline;
 use super::round;
+use crate::region::Polygon;
 use crate::terrain::Crs;
 use crate::{GridFrame, Result, Route};
 
@@ -42,13 +43,56 @@ pub fn isolines_geojson(
     collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
-/// Lines in map coordinates (z: height, or `NaN` for none) and their properties.
-struct Lines {
-    lines: Vec<Vec<DVec3>>,
+/// A feature per region, given by its properties, a JSON object, and its polygons; `frame` places them. Rings run as RFC 7946 wants them;
+/// one that crosses 180° goes on beyond it.
+///
+/// # Errors
+/// As [`routes_geojson`].
+pub fn regions_geojson(
+    regions: &[(JsonObject, Vec<Polygon>)],
+    frame: &GridFrame,
+    crs: &Crs,
+    provenance: &Value,
+) -> Result<String> {
+    let features =
+        regions.iter().map(|(properties, polygons)| region_feature(properties, polygons, frame));
+    collection(features.collect(), |map| crs.to_lonlat(map), provenance)
+}
+
+/// A geometry in map coordinates (z: height, or `NaN` for none) and its properties.
+struct Shape {
+    geometry: Geometry,
     properties: JsonObject,
 }
 
-fn route_feature(name: &str, route: &Route) -> Lines {
+enum Geometry {
+    Lines(Vec<Vec<DVec3>>),
+    /// Polygons of an exterior and holes.
+    Areas(Vec<Vec<Vec<DVec3>>>),
+}
+
+impl Geometry {
+    fn first(&self) -> Option<DVec3> {
+        let line = match self {
+            Self::Lines(lines) => lines.first(),
+            Self::Areas(areas) => areas.first().and_then(|rings| rings.first()),
+        };
+        line?.first().copied()
+    }
+
+    fn in_degrees(&self, to_lonlat: impl Fn(DVec2) -> Result<DVec2>) -> Result<Self> {
+        Ok(match self {
+            Self::Lines(lines) => Self::Lines(in_degrees(lines, to_lonlat)?),
+            Self::Areas(areas) => {
+                let ring = |ring: &Vec<DVec3>| ring_in_degrees(ring, &to_lonlat);
+                let area = |rings: &Vec<Vec<DVec3>>| rings.iter().map(ring).collect();
+                Self::Areas(areas.iter().map(area).collect::<Result<_>>()?)
+            }
+        })
+    }
+}
+
+fn route_feature(name: &str, route: &Route) -> Shape {
     let mut properties = JsonObject::new();
     properties.insert("name".into(), name.into());
     let summary = serde_json::to_value(&route.summary).expect("numbers and texts are JSON");
@@ -60,24 +104,34 @@ fn route_feature(name: &str, route: &Route) -> Lines {
     if let [only] = line[..] {
         line.push(only);
     }
-    Lines { lines: vec![line], properties }
+    Shape { geometry: Geometry::Lines(vec![line]), properties }
 }
 
-fn isoline_feature(isoline: &Isoline, frame: &GridFrame, unit: &str) -> Lines {
+fn isoline_feature(isoline: &Isoline, frame: &GridFrame, unit: &str) -> Shape {
     let place =
         |line: &Vec<DVec2>| line.iter().map(|&p| frame.to_map(p).extend(f64::NAN)).collect();
     let mut properties = JsonObject::new();
     properties.insert("distance".into(), isoline.level.into());
     properties.insert("unit".into(), unit.into());
-    Lines { lines: isoline.lines.iter().map(place).collect(), properties }
+    Shape { geometry: Geometry::Lines(isoline.lines.iter().map(place).collect()), properties }
+}
+
+fn region_feature(properties: &JsonObject, polygons: &[Polygon], frame: &GridFrame) -> Shape {
+    let place =
+        |ring: &Vec<DVec2>| ring.iter().map(|&p| frame.to_map(p).extend(f64::NAN)).collect();
+    let rings = |polygon: &Polygon| {
+        std::iter::once(&polygon.exterior).chain(&polygon.holes).map(place).collect()
+    };
+    let geometry = Geometry::Areas(polygons.iter().map(rings).collect());
+    Shape { geometry, properties: properties.clone() }
 }
 
 fn collection(
-    features: Vec<Lines>,
+    features: Vec<Shape>,
     to_lonlat: impl Fn(DVec2) -> Result<DVec2>,
     provenance: &Value,
 ) -> Result<String> {
-    let first = features.iter().flat_map(|f| &f.lines).flatten().next();
+    let first = features.iter().find_map(|f| f.geometry.first());
     let no_lonlat = first.and_then(|p| to_lonlat(p.truncate()).err());
     let mut members = JsonObject::new();
     members.insert("provenance".into(), provenance.clone());
@@ -92,9 +146,9 @@ fn collection(
     let geographic = no_lonlat.is_none();
     let features = features
         .into_iter()
-        .map(|Lines { lines, properties }| {
-            let lines = if geographic { in_degrees(&lines, &to_lonlat)? } else { lines };
-            Ok(Feature { properties: Some(properties), ..Feature::from(geometry(&lines)) })
+        .map(|Shape { geometry, properties }| {
+            let geometry = if geographic { geometry.in_degrees(&to_lonlat)? } else { geometry };
+            Ok(Feature { properties: Some(properties), ..Feature::from(value(&geometry)) })
         })
         .collect::<Result<Vec<_>>>()?;
     let collection =
@@ -118,12 +172,36 @@ fn in_degrees(
     Ok(parts)
 }
 
-fn geometry(lines: &[Vec<DVec3>]) -> GeometryValue {
+/// A ring in longitude and latitude, going the short way round from each position to the next.
+fn ring_in_degrees(
+    ring: &[DVec3],
+    to_lonlat: impl Fn(DVec2) -> Result<DVec2>,
+) -> Result<Vec<DVec3>> {
+    let mut before: Option<f64> = None;
+    let mut position = |p: &DVec3| {
+        let mut here = to_lonlat(p.truncate())?;
+        if let Some(before) = before {
+            here.x -= 360.0 * ((here.x - before) / 360.0).round();
+        }
+        before = Some(here.x);
+        Ok(here.extend(p.z))
+    };
+    ring.iter().map(&mut position).collect()
+}
+
+fn value(geometry: &Geometry) -> GeometryValue {
     let positions =
         |line: &Vec<DVec3>| -> Vec<Position> { line.iter().map(|p| position(*p)).collect() };
-    match lines {
-        [line] => GeometryValue::LineString { coordinates: positions(line) },
-        _ => GeometryValue::MultiLineString { coordinates: lines.iter().map(positions).collect() },
+    let rings = |rings: &Vec<Vec<DVec3>>| -> Vec<_> { rings.iter().map(positions).collect() };
+    match geometry {
+        Geometry::Lines(lines) => match &lines[..] {
+            [line] => GeometryValue::LineString { coordinates: positions(line) },
+            _ => GeometryValue::MultiLineString { coordinates: rings(lines) },
+        },
+        Geometry::Areas(areas) => match &areas[..] {
+            [area] => GeometryValue::Polygon { coordinates: rings(area) },
+            _ => GeometryValue::MultiPolygon { coordinates: areas.iter().map(rings).collect() },
+        },
     }
 }
 
@@ -247,6 +325,33 @@ pub(super) mod tests {
         let parts = cut_at_antimeridian(&line);
         assert!(parts.iter().all(|part| part.iter().all(|p| p.x < 0.0)), "{parts:?}");
         assert_eq!(cut_at_antimeridian(&line[..1]).len(), 1);
+    }
+
+    #[test]
+    fn regions_are_polygons_with_holes() {
+        let square = |from: f64, to: f64| {
+            [(from, to), (to, to), (to, from), (from, from), (from, to)].map(DVec2::from).to_vec()
+        };
+        let mut hole = square(0.5, 1.5);
+        hole.reverse();
+        let polygon = Polygon { exterior: square(-0.5, 2.5), holes: vec![hole] };
+        // The middle column lies on 180°.
+        let frame =
+            GridFrame::new(3, 3, DVec2::new(179.0, 1.0), DVec2::ONE, Ground::WGS84).unwrap();
+        let mut properties = JsonObject::new();
+        properties.insert("region".into(), 7.into());
+        let wrapped = |p: DVec2| Ok(DVec2::new(p.x - 360.0 * (p.x / 360.0).round(), p.y));
+        let features = vec![region_feature(&properties, &[polygon], &frame)];
+        let text = collection(features, wrapped, &Value::Null).unwrap();
+        let json: Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["features"][0]["properties"]["region"], 7);
+        let rings = &json["features"][0]["geometry"]["coordinates"];
+        assert_eq!(json["features"][0]["geometry"]["type"], "Polygon");
+        assert_eq!(
+            rings[0],
+            json!([[178.5, -1.5], [181.5, -1.5], [181.5, 1.5], [178.5, 1.5], [178.5, -1.5]])
+        );
+        assert_eq!(rings[1].as_array().unwrap().len(), 5);
     }
 
     #[test]

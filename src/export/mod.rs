@@ -11,7 +11,7 @@ mod isolines;
 mod profile;
 
 pub use self::atomic::{check_folder_free, check_free, write_file, write_folder};
-pub use self::geojson::{isolines_geojson, routes_geojson};
+pub use self::geojson::{isolines_geojson, regions_geojson, routes_geojson};
 pub use self::geotiff::{Band, Samples, write_geotiff};
 pub use self::gpx::routes_gpx;
 pub use self::isolines::{Isoline, isolines, levels_by_step, round_step};

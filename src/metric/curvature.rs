@@ -62,7 +62,7 @@ pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
 }
 
 /// The same on any surface, in grid coordinates: the first formula above with `H`, `K`, `G` and `B` as they are.
-pub(super) fn of_surface(jet: &SurfaceJet, delta: f64) -> Sym2 {
+pub(crate) fn of_surface(jet: &SurfaceJet, delta: f64) -> Sym2 {
     let (inverse, b) = (jet.first_form().inverse(), jet.second_form());
     let [h, k] = jet.mean_and_gaussian();
     let (q, c, sum) = if k < 0.0 {

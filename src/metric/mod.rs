@@ -27,6 +27,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 pub(crate) use self::block::SpeedBlock;
+pub(crate) use self::curvature::of_surface;
 pub use self::difference::{Change, Difference, DifferenceForm, neighbour_differences};
 pub use self::space::SurfaceMetric;
 pub use self::sym2::Sym2;

@@ -1,9 +1,10 @@
-//! A map: shaded terrain, isolines, routes, start and goal.
+//! A map: shaded terrain, regions, isolines, routes, start and goal.
 
 use glam::{DVec2, Vec2};
 use tiny_skia::Pixmap;
 
 use super::canvas::{self, Rgb};
+use super::regions::RegionLayer;
 use super::relief::Relief;
 use super::sheet::{Item, SIDE, Sheet};
 use super::text;
@@ -48,6 +49,8 @@ pub struct MapPicture<'a> {
     pub heights: &'a [f64],
     /// Nodes that cannot be entered, row-major; empty for none. Voids need not be named.
     pub barriers: &'a [bool],
+    /// Regions, in their colours mixed half and half with the ground; `None` for none.
+    pub regions: Option<RegionLayer<'a>>,
     /// Isolines, drawn in this order.
     pub isolines: Vec<IsolineLayer<'a>>,
     /// Routes, drawn in this order, each thinner than the one before, so that all of them are seen
@@ -71,6 +74,7 @@ impl<'a> MapPicture<'a> {
             frame,
             heights,
             barriers: &[],
+            regions: None,
             isolines: Vec::new(),
             routes: Vec::new(),
             starts: Vec::new(),
@@ -95,6 +99,9 @@ impl<'a> MapPicture<'a> {
         }
         let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, self.legend())?;
         self.draw_ground(&mut sheet);
+        if let Some(regions) = &self.regions {
+            regions.draw_borders(&mut sheet);
+        }
         let mut labels = Vec::new();
         for layer in &self.isolines {
             labels.extend(draw_isolines(&mut sheet, layer));
@@ -147,7 +154,10 @@ impl<'a> MapPicture<'a> {
         sheet.ground(|grid| {
             let colour = relief.at(grid)?;
             let node = self.frame.clamp(grid).round();
-            let barrier = self.barriers.get(self.frame.index(node.x as usize, node.y as usize));
+            let node = self.frame.index(node.x as usize, node.y as usize);
+            let barrier = self.barriers.get(node);
+            let region = self.regions.as_ref().and_then(|regions| regions.colour(node));
+            let colour = region.map_or(colour, |region| colour.mix(region, 0.5));
             Some(if barrier == Some(&true) { colour.mix(BARRIER, 0.5) } else { colour })
         });
     }

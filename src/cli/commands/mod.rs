@@ -4,8 +4,10 @@ mod compare;
 mod distance;
 mod info;
 mod manual;
+mod matching;
 mod render;
 mod route;
+mod segment;
 mod surface;
 mod synth;
 
@@ -31,6 +33,8 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
         Command::Distance(args) => distance::run(args, run, &control),
         Command::Route(args) => route::run(args, run, &control),
         Command::Compare(args) => compare::run(args, run, &control),
+        Command::Segment(args) => segment::run(args, run, &control),
+        Command::Match(args) => matching::run(args, run, &control),
         Command::Render(args) => render::run(args, run, &control),
         Command::Completions { shell } => manual::completions(*shell),
         Command::Man => manual::page(),

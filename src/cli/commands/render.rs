@@ -126,7 +126,7 @@ fn colour(metric: &str) -> Rgb {
     }
 }
 
-fn title(dem: &Path) -> String {
+pub(super) fn title(dem: &Path) -> String {
     dem.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 

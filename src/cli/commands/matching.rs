@@ -1,0 +1,261 @@
+//! `ridgeway match`: regions of like shape on two surfaces, or on one.
+
+use std::fs;
+use std::path::Path;
+
+use glam::DVec2;
+use ridgeway::export::write_folder;
+use ridgeway::metric::Difference;
+use ridgeway::region::{
+    Level, Match, Neighbours, SegmentOptions, Segmentation, Signature, difference_ranks,
+    gaussian_ranks, matches, matches_within, outlines, signatures,
+};
+use ridgeway::render::{
+    LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, pair_colour, png,
+};
+use ridgeway::surface::{NurbsGrid, NurbsSurface};
+use ridgeway::{Control, Delta, Error, HeightSurface, Metric, ParametricSurface, Result, Terrain};
+use serde_json::{Value, json};
+
+use super::render::title;
+use crate::args::{MatchArgs, MetricName, RunArgs};
+use crate::output::check_outputs_in;
+use crate::plan::{self, command_line};
+use crate::report::{Report, Table, digits, metres};
+
+const FILES: [&str; 3] = ["matches.json", "regions.png", "signatures.png"];
+
+/// Most pairs that the table names.
+const NAMED: usize = 20;
+
+/// Length of the longer side of each surface in `regions.png`.
+const PIXELS: u32 = 1000;
+
+pub(super) fn run(args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<()> {
+    if let Some(folder) = &args.output {
+        check_outputs_in(folder, &FILES, args.overwrite)?;
+    }
+    let subjects = args
+        .surfaces
+        .iter()
+        .map(|path| Subject::open(path, args, run, control))
+        .collect::<Result<Vec<_>>>()?;
+    let found = match &subjects[..] {
+        [one] => matches_within(&one.signatures, args.sized)?,
+        [first, second] => matches(&first.signatures, &second.signatures, args.sized)?,
+        _ => return Err(Error::usage("match compares one surface with itself, or two")),
+    };
+    let summary = summary(&subjects, &found);
+    if let Some(folder) = &args.output {
+        control.check()?;
+        let colours = colours(&subjects, &found);
+        let contents = [
+            format!("{summary:#}\n").into_bytes(),
+            regions(&subjects, &colours)?,
+            plot(&subjects, &colours)?,
+        ];
+        write_folder(folder, args.overwrite, |folder| {
+            FILES.iter().zip(&contents).try_for_each(|(name, content)| {
+                fs::write(folder.join(name), content).map_err(|source| Error::io(name, source))
+            })
+        })?;
+    }
+    let written = args.output.iter().map(|folder| {
+        let files = FILES.map(|name| folder.join(name).display().to_string());
+        format!("wrote {}\n", files.join(", "))
+    });
+    let text = table(&subjects, &found) + &written.collect::<String>();
+    Report { text, json: summary }.print(run)
+}
+
+/// A surface cut into regions.
+struct Subject<'a> {
+    path: &'a Path,
+    ground: Ground,
+    /// The finest level.
+    level: Level,
+    signatures: Vec<Signature>,
+}
+
+enum Ground {
+    Heights(Box<(Terrain, HeightSurface)>),
+    Nurbs(NurbsGrid),
+}
+
+impl<'a> Subject<'a> {
+    /// Reads a surface and cuts it.
+    ///
+    /// # Errors
+    /// A file that cannot be read or used.
+    fn open(path: &'a Path, args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<Self> {
+        let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let ground = if is_json {
+            let (cols, rows) = args.nodes;
+            Ground::Nurbs(NurbsSurface::open(path)?.on_grid(cols, rows)?)
+        } else {
+            let terrain = plan::open(path, run)?;
+            let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
+            Ground::Heights(Box::new((terrain, surface)))
+        };
+        let surface = ground.surface();
+        let metric = match args.metric {
+            MetricName::Isotropic => Metric::Isotropic,
+            MetricName::Curvature => Metric::Curvature(Delta::default()),
+            MetricName::Difference => Metric::Difference(Difference::default()),
+            MetricName::DifferenceLiteral | MetricName::Tensor => {
+                return Err(Error::usage(
+                    "match needs a metric that knows nothing of the grid: curvature, difference or isotropic",
+                ));
+            }
+        };
+        let ranks = match args.metric {
+            MetricName::Difference => difference_ranks(surface, &Difference::default(), control)?,
+            _ => gaussian_ranks(surface),
+        };
+        let field = metric.on_surface(surface)?.sample(control)?;
+        let options = SegmentOptions { levels: args.levels.into(), ..SegmentOptions::default() };
+        let mut levels = Segmentation::of(&field, &ranks, &options, control)?.levels;
+        let level = levels.pop().unwrap_or_default();
+        let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
+        Ok(Self { path, ground, level, signatures })
+    }
+
+    /// The seed of a region: map coordinates on a DEM, else the point in space.
+    fn seed(&self, region: usize) -> Vec<f64> {
+        let [col, row] = self.level.regions[region].seed;
+        let node = DVec2::new(col as f64, row as f64);
+        match &self.ground {
+            Ground::Heights(ground) => ground.0.frame().to_map(node).to_array().into(),
+            Ground::Nurbs(surface) => surface.space_jet(node).point.to_array().into(),
+        }
+    }
+}
+
+impl Ground {
+    fn surface(&self) -> &dyn ParametricSurface {
+        match self {
+            Self::Heights(ground) => &ground.1,
+            Self::Nurbs(surface) => surface,
+        }
+    }
+}
+
+/// The place of the second surface of a match among the subjects.
+fn second(subjects: &[Subject<'_>]) -> usize {
+    subjects.len() - 1
+}
+
+/// Colour of each region of each surface: one for the regions of a match.
+fn colours(subjects: &[Subject<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
+    let unmatched = |subject: &Subject<'_>| vec![pair_colour(None); subject.signatures.len()];
+    let mut colours: Vec<_> = subjects.iter().map(unmatched).collect();
+    for (rank, pair) in found.iter().enumerate() {
+        colours[0][pair.first] = pair_colour(Some(rank));
+        colours[second(subjects)][pair.second] = pair_colour(Some(rank));
+    }
+    colours
+}
+
+/// The surfaces side by side.
+fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
+    let picture = |(subject, colours): (&Subject<'_>, &Vec<Rgb>)| match &subject.ground {
+        Ground::Heights(ground) => {
+            let terrain = &ground.0;
+            let outlines = outlines(&subject.level, terrain.frame().cols());
+            let mut map = MapPicture::new(terrain.frame(), terrain.heights());
+            (map.title, map.max_side_px) = (title(subject.path), PIXELS);
+            map.regions = Some(RegionLayer {
+                labels: &subject.level.labels,
+                colours: colours.clone(),
+                borders: vec![&outlines],
+                seeds: Vec::new(),
+            });
+            map.render()
+        }
+        Ground::Nurbs(surface) => {
+            let labels = subject.level.labels.iter();
+            let colours: Vec<_> =
+                labels.map(|l| l.map_or(Rgb::WHITE, |l| colours[l as usize])).collect();
+            let mut picture = SurfacePicture::new(surface, &colours);
+            (picture.title, picture.max_side_px) = (title(subject.path), PIXELS);
+            picture.blend = false;
+            picture.render()
+        }
+    };
+    png(&beside(&subjects.iter().zip(colours).map(picture).collect::<Result<Vec<_>>>()?)?)
+}
+
+/// The two largest eigenvalues of all regions.
+fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
+    let mut plot = LogPlot {
+        kinds: subjects.iter().map(|subject| title(subject.path)).collect(),
+        axes: ["λ1".into(), "λ2".into()],
+        title: "Signatures; one colour: matched".into(),
+        ..LogPlot::default()
+    };
+    for (kind, (subject, colours)) in subjects.iter().zip(colours).enumerate() {
+        let marks = subject.signatures.iter().zip(colours).enumerate();
+        plot.marks.extend(marks.map(|(i, (signature, &colour))| {
+            let [x, y, ..] = signature.eigenvalues;
+            Mark { at: DVec2::new(x, y), colour, kind, label: (i + 1).to_string() }
+        }));
+    }
+    plot.png()
+}
+
+fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
+    let mut text = String::new();
+    for subject in subjects {
+        text += &format!("{}: {} regions\n", title(subject.path), subject.signatures.len());
+    }
+    let mut table = Table::default();
+    let header = ["", "first", "second", "unlike", "size", "size", "ratio", "best of all"];
+    table.row(header);
+    for (i, pair) in found.iter().take(NAMED).enumerate() {
+        let size = |k: usize, region: usize| metres(subjects[k].signatures[region].size);
+        table.row([
+            (i + 1).to_string(),
+            (pair.first + 1).to_string(),
+            (pair.second + 1).to_string(),
+            format!("{:.3}", pair.distance),
+            size(0, pair.first),
+            size(second(subjects), pair.second),
+            digits(pair.size_ratio),
+            if pair.mutual { "yes" } else { "no" }.to_owned(),
+        ]);
+    }
+    text += &table.to_string();
+    if found.len() > NAMED {
+        text += &format!("and {} pairs less alike\n", found.len() - NAMED);
+    }
+    text
+}
+
+fn summary(subjects: &[Subject<'_>], found: &[Match]) -> Value {
+    let surface = |subject: &Subject<'_>| {
+        let regions = subject.signatures.iter().enumerate().map(|(i, signature)| {
+            json!({
+                "region": i + 1,
+                "seed": subject.seed(i),
+                "size_m": signature.size,
+                "signature": signature.eigenvalues,
+            })
+        });
+        json!({ "file": title(subject.path), "regions": regions.collect::<Vec<_>>() })
+    };
+    let pair = |pair: &Match| {
+        json!({
+            "first": pair.first + 1,
+            "second": pair.second + 1,
+            "unlikeness": pair.distance,
+            "size_ratio": pair.size_ratio,
+            "mutual": pair.mutual,
+        })
+    };
+    json!({
+        "surfaces": subjects.iter().map(surface).collect::<Vec<_>>(),
+        "matches": found.iter().map(pair).collect::<Vec<_>>(),
+        "software": format!("ridgeway {}", env!("CARGO_PKG_VERSION")),
+        "command": command_line(),
+    })
+}

@@ -1,0 +1,248 @@
+//! `ridgeway segment`: regions of like shape.
+
+use ridgeway::eikonal::TensorField;
+use ridgeway::export::{Samples, regions_geojson};
+use ridgeway::metric::DifferenceForm;
+use ridgeway::region::{
+    Level, Neighbours, Polygon, RegionStatistics, SegmentOptions, Segmentation, Signature,
+    difference_ranks, gaussian_ranks, outlines, signatures, statistics,
+};
+use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
+use ridgeway::{Control, HeightSurface, MetricField, Result};
+use serde_json::{Map, Value, json};
+
+use super::render::title;
+use crate::args::{MetricName, RunArgs, SegmentArgs};
+use crate::output::{check_distinct, check_file, write_content, write_raster};
+use crate::plan::Journey;
+use crate::report::{Facts, Report, Table, coordinate, digits, distance, wrote};
+use glam::DVec2;
+
+/// Most regions of a level that the table names.
+const NAMED: usize = 20;
+
+pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Result<()> {
+    check_distinct(&args.output.iter().collect::<Vec<_>>())?;
+    let known = ["geojson", "json", "tif", "tiff", "png"];
+    let formats = args
+        .output
+        .iter()
+        .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
+        .collect::<Result<Vec<_>>>()?;
+    let options = SegmentOptions {
+        levels: args.levels.map_or(args.epsilon.len().max(1), usize::from),
+        epsilons: args.epsilon.clone(),
+        solver: args.ground.metric.solver(),
+    };
+    let mut journey = Journey::prepare(&args.dem, (&[], &[]), &args.ground, run, control)?;
+    if !formats.iter().any(|format| format == "png") {
+        journey = journey.without_heights();
+    }
+    let name = args.metric.unwrap_or(journey.default_metric());
+    let metric = journey.field(name)?;
+    let field = TensorField::sample(&metric, control)?;
+    let ranks = ranks(name, args, &journey.surface, control)?;
+    let mut segmentation = Segmentation::of(&field, &ranks, &options, control)?;
+    drop((field, ranks));
+    if let Some(tolerance) = args.merge {
+        segmentation.merge_alike(&journey.surface, tolerance, control)?;
+    }
+    let measures = measures(&segmentation, &journey.surface, control)?;
+    let outcome = Outcome { journey: &journey, metric: &metric, segmentation, measures };
+    control.check()?;
+    let provenance = journey.provenance(std::slice::from_ref(&metric));
+    for (path, format) in args.output.iter().zip(&formats) {
+        match format.as_str() {
+            "png" => write_content(path, args.overwrite, &outcome.picture(title(&args.dem))?)?,
+            "tif" | "tiff" => outcome.write_labels(path, args.overwrite)?,
+            _ => write_content(path, args.overwrite, &outcome.polygons(&provenance)?)?,
+        }
+    }
+    let written: String = args.output.iter().map(|path| wrote(path)).collect();
+    let regions: Vec<_> =
+        outcome.named().map(|(_, properties)| Value::Object(properties)).collect();
+    let json = json!({
+        "metric": metric.name(),
+        "unit": metric.unit(),
+        "delta_per_m": metric.delta(),
+        "regions": regions,
+        "provenance": provenance,
+    });
+    Report { text: outcome.text() + &written, json }.print(run)
+}
+
+/// The order in which nodes become seeds.
+fn ranks(
+    name: MetricName,
+    args: &SegmentArgs,
+    surface: &HeightSurface,
+    control: &Control,
+) -> Result<Vec<f64>> {
+    let form = match name {
+        MetricName::Difference => DifferenceForm::Rate,
+        MetricName::DifferenceLiteral => DifferenceForm::Literal,
+        _ => return Ok(gaussian_ranks(surface)),
+    };
+    difference_ranks(surface, &args.ground.metric.difference(form), control)
+}
+
+/// Statistics and signature of each region of each level.
+fn measures(
+    segmentation: &Segmentation,
+    surface: &HeightSurface,
+    control: &Control,
+) -> Result<Vec<Vec<(RegionStatistics, Signature)>>> {
+    let of_level = |level: &Level| {
+        control.report("measuring", 0.0);
+        let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
+        Ok(statistics(surface, level).into_iter().zip(signatures).collect())
+    };
+    segmentation.levels.iter().map(of_level).collect()
+}
+
+/// Regions and what is known of them.
+struct Outcome<'a> {
+    journey: &'a Journey<'a>,
+    metric: &'a MetricField<'a>,
+    segmentation: Segmentation,
+    measures: Vec<Vec<(RegionStatistics, Signature)>>,
+}
+
+impl Outcome<'_> {
+    /// Level and properties of each region, in order.
+    fn named(&self) -> impl Iterator<Item = (usize, Map<String, Value>)> + '_ {
+        self.segmentation.levels.iter().zip(&self.measures).enumerate().flat_map(
+            move |(depth, (level, measures))| {
+                let named = level.regions.iter().zip(measures).enumerate();
+                named.map(move |(i, (region, (statistics, signature)))| {
+                    let seed = self.journey.terrain.frame().to_map(node(region.seed));
+                    let mut properties = Map::new();
+                    let mut add = |name: &str, value: Value| properties.insert(name.into(), value);
+                    add("level", (depth + 1).into());
+                    add("region", (i + 1).into());
+                    add("parent", region.parent.map(|parent| parent + 1).into());
+                    add("epsilon", region.epsilon.into());
+                    add("epsilon_unit", self.metric.unit().into());
+                    add("seed", json!(seed.to_array()));
+                    add("signature", json!(signature.eigenvalues));
+                    if let Ok(Value::Object(statistics)) = serde_json::to_value(statistics) {
+                        properties.extend(statistics);
+                    }
+                    (depth, properties)
+                })
+            },
+        )
+    }
+
+    fn outlines(&self) -> Vec<Vec<Vec<Polygon>>> {
+        let levels = self.segmentation.levels.iter();
+        levels.map(|level| outlines(level, self.segmentation.cols)).collect()
+    }
+
+    fn polygons(&self, provenance: &Value) -> Result<Vec<u8>> {
+        let polygons = self.outlines().into_iter().flatten();
+        let regions: Vec<_> =
+            self.named().zip(polygons).map(|((_, named), polygons)| (named, polygons)).collect();
+        let terrain = &self.journey.terrain;
+        Ok(regions_geojson(&regions, terrain.frame(), terrain.crs(), provenance)?.into_bytes())
+    }
+
+    fn write_labels(&self, path: &std::path::Path, overwrite: bool) -> Result<()> {
+        let number = |label: &Option<u32>| label.map_or(0, |label| label + 1);
+        let numbers = |level: &Level| level.labels.iter().map(number).collect::<Vec<u32>>();
+        let numbers: Vec<_> = self.segmentation.levels.iter().map(numbers).collect();
+        let name = |depth: usize| format!("region of level {}", depth + 1);
+        let bands: Vec<_> =
+            numbers.iter().enumerate().map(|(i, n)| (name(i), Samples::U32(n))).collect();
+        write_raster(path, overwrite, &self.journey.terrain, &bands)
+    }
+
+    fn picture(&self, title: String) -> Result<Vec<u8>> {
+        let terrain = &self.journey.terrain;
+        let outlines = self.outlines();
+        let mut map = MapPicture::new(terrain.frame(), terrain.heights());
+        map.title = title;
+        if let Some(finest) = self.segmentation.levels.last() {
+            let count = finest.regions.len();
+            map.regions = Some(RegionLayer {
+                labels: &finest.labels,
+                colours: contrasting_colours(&finest.labels, self.segmentation.cols, count),
+                borders: outlines.iter().map(Vec::as_slice).collect(),
+                seeds: finest.regions.iter().map(|region| node(region.seed)).collect(),
+            });
+        }
+        map.png()
+    }
+
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for (depth, (level, measures)) in
+            self.segmentation.levels.iter().zip(&self.measures).enumerate()
+        {
+            let mut facts = Facts::default();
+            let count = level.regions.len();
+            let noun = if count == 1 { "region" } else { "regions" };
+            facts.add(format!("level {}", depth + 1), format!("{count} {noun}"));
+            facts.add("epsilon", self.epsilons(level));
+            text += &facts.to_string();
+            text += &self.table(level, measures).to_string();
+            if count > NAMED {
+                text += &format!("and {} smaller ones\n", count - NAMED);
+            }
+        }
+        text
+    }
+
+    /// The radius of the clusters, or the range of radii.
+    fn epsilons(&self, level: &Level) -> String {
+        let all = level.regions.iter().map(|region| region.epsilon);
+        let (least, most) =
+            all.fold((f64::INFINITY, 0.0), |(a, b), e| (f64::min(a, e), f64::max(b, e)));
+        let unit = self.metric.unit();
+        if least < most {
+            format!("{} to {}", distance(least, unit), distance(most, unit))
+        } else {
+            distance(most, unit)
+        }
+    }
+
+    /// The largest regions of a level.
+    fn table(&self, level: &Level, measures: &[(RegionStatistics, Signature)]) -> Table {
+        let mut order: Vec<usize> = (0..measures.len()).collect();
+        order.sort_by(|&a, &b| measures[b].0.area_m2.total_cmp(&measures[a].0.area_m2));
+        let mut table = Table::default();
+        table.row(["region", "of", "cells", "area", "slope", "|κ1|, 1/m", "|κ2|, 1/m", "seed"]);
+        let cell = self.journey.terrain.frame().step().min_element();
+        for &i in order.iter().take(NAMED) {
+            let (region, m) = (&level.regions[i], &measures[i].0);
+            let [larger, smaller] = m.mean_abs_curvature_per_m.map(digits);
+            let seed = self.journey.terrain.frame().to_map(node(region.seed));
+            let [x, y] = seed.to_array().map(|value| coordinate(value, cell));
+            table.row([
+                (i + 1).to_string(),
+                region.parent.map_or(String::new(), |parent| (parent + 1).to_string()),
+                m.nodes.to_string(),
+                area(m.area_m2),
+                format!("{:.1}°", m.mean_slope_deg),
+                larger,
+                smaller,
+                format!("{x},{y}"),
+            ]);
+        }
+        table
+    }
+}
+
+/// An area with its unit: `823 m²`, `12.34 km²`.
+fn area(square_metres: f64) -> String {
+    if square_metres >= 1e5 {
+        format!("{} km²", digits(square_metres * 1e-6))
+    } else {
+        format!("{} m²", digits(square_metres))
+    }
+}
+
+/// Grid coordinates of a node.
+fn node([col, row]: [usize; 2]) -> DVec2 {
+    DVec2::new(col as f64, row as f64)
+}

@@ -1,0 +1,143 @@
+//! Which regions are alike, on two surfaces or on one.
+
+use serde::Serialize;
+
+use super::Signature;
+use crate::{Error, Result};
+
+/// Two regions that were matched.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Match {
+    /// The region of the first surface.
+    pub first: usize,
+    /// The region of the second surface; of one surface the one with the larger number.
+    pub second: usize,
+    /// How unlike they are, 0 to 1, see [`Signature::distance`].
+    pub distance: f64,
+    /// Size of the second as a multiple of the first's.
+    pub size_ratio: f64,
+    /// Whether each is the most similar to the other of all; else a more similar one has a better match.
+    pub mutual: bool,
+}
+
+/// Matches regions of two surfaces: the two most alike first, then the two most alike of the others, until one surface
+/// has none left. With `sized`, size counts beside shape.
+///
+/// # Cost
+/// Some 50 ns and 24 bytes for each pair.
+///
+/// # Errors
+/// [`Error::Usage`] for more than 16 million pairs.
+pub fn matches(first: &[Signature], second: &[Signature], sized: bool) -> Result<Vec<Match>> {
+    let pairs = (0..first.len()).flat_map(|i| (0..second.len()).map(move |j| (i, j)));
+    let offset = first.len();
+    greedy(first, second, pairs, |j| offset + j, sized)
+}
+
+/// Matches regions of one surface with each other, as [`matches`].
+///
+/// # Errors
+/// As [`matches`].
+pub fn matches_within(regions: &[Signature], sized: bool) -> Result<Vec<Match>> {
+    let count = regions.len();
+    let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+    greedy(regions, regions, pairs, |j| j, sized)
+}
+
+/// Takes pairs in order of their distance, ties by number, as long as both are free. `slot` numbers the regions of the
+/// second surface apart from those of the first, if they are others.
+fn greedy(
+    first: &[Signature],
+    second: &[Signature],
+    pairs: impl Iterator<Item = (usize, usize)>,
+    slot: impl Fn(usize) -> usize,
+    sized: bool,
+) -> Result<Vec<Match>> {
+    const MOST: usize = 1 << 24;
+    if first.len().saturating_mul(second.len()) > MOST {
+        return Err(Error::usage(format!(
+            "{} and {} regions are too many to compare; segment more coarsely",
+            first.len(),
+            second.len()
+        )));
+    }
+    let unlike = |i: usize, j: usize| {
+        let (a, b) = (&first[i], &second[j]);
+        if sized { a.sized_distance(b) } else { a.distance(b) }
+    };
+    // A region without nodes is like none.
+    let pairs = pairs.filter(|&(i, j)| first[i].size > 0.0 && second[j].size > 0.0);
+    let mut pairs: Vec<_> = pairs.map(|(i, j)| (unlike(i, j), i, j)).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut state = vec![Region::default(); first.len() + second.len()];
+    let mut found = Vec::new();
+    for (distance, i, j) in pairs {
+        let (a, b) = (state[i], state[slot(j)]);
+        if !a.taken && !b.taken {
+            let mutual = !a.seen && !b.seen;
+            let size_ratio = second[j].size / first[i].size;
+            found.push(Match { first: i, second: j, distance, size_ratio, mutual });
+            state[i].taken = true;
+            state[slot(j)].taken = true;
+        }
+        state[i].seen = true;
+        state[slot(j)].seen = true;
+    }
+    Ok(found)
+}
+
+/// What became of a region so far.
+#[derive(Clone, Copy, Default)]
+struct Region {
+    /// It was in a pair.
+    seen: bool,
+    /// It has its match.
+    taken: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn regions(numbers: &[f64]) -> Vec<Signature> {
+        let of = |&x: &f64| Signature { eigenvalues: [x * x, x, 0.0, 0.0], size: x };
+        numbers.iter().map(of).collect()
+    }
+
+    fn pairs(found: &[Match]) -> Vec<(usize, usize, bool)> {
+        found.iter().map(|m| (m.first, m.second, m.mutual)).collect()
+    }
+
+    #[test]
+    fn the_most_alike_come_first_and_each_is_used_once() {
+        let (a, b) = (regions(&[100.0, 9.0, 1.0]), regions(&[1.1, 100.0, 120.0]));
+        let found = matches(&a, &b, false).unwrap();
+        assert_eq!(pairs(&found), [(0, 1, true), (2, 0, true), (1, 2, false)]);
+        assert_eq!(found[0].distance, 0.0);
+        assert!((found[1].size_ratio - 1.1).abs() < 1e-12);
+        assert!(matches(&a, &[], false).unwrap().is_empty());
+    }
+
+    #[test]
+    fn within_one_surface_nothing_matches_itself() {
+        let found = matches_within(&regions(&[5.0, 1.0, 5.0, 1.2, 70.0]), false).unwrap();
+        assert_eq!(pairs(&found), [(0, 2, true), (1, 3, true)]);
+    }
+
+    #[test]
+    fn size_counts_if_asked_for() {
+        let mut b = regions(&[4.0, 4.4]);
+        b[0].size = 400.0;
+        let a = regions(&[4.0]);
+        assert_eq!(matches(&a, &b, false).unwrap()[0].second, 0);
+        assert_eq!(matches(&a, &b, true).unwrap()[0].second, 1);
+    }
+
+    #[test]
+    fn too_many_pairs_are_refused() {
+        let many = vec![Signature::default(); 5000];
+        assert!(matches(&many, &many, false).is_err());
+        // Of regions without nodes there is nothing to match.
+        assert!(matches_within(&many[..4], true).unwrap().is_empty());
+    }
+}
