@@ -92,7 +92,8 @@ impl Surroundings {
             let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
             let seeds = input.seeds[tile].as_deref();
             let tile = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
-            *reads = find(self, k * SIDE, &tile, size, feet);
+            let last = input.total.is_some();
+            *reads = find(self, k * SIDE, &tile, size, last, feet);
         }
     }
 }
@@ -163,7 +164,8 @@ fn rises<const N: usize>(
     rises
 }
 
-/// Finds the feet of the tile of a size that begins at column `from`; the neighbours that it reads.
+/// Finds the feet of the tile of a size that begins at column `from`; the neighbours that it reads. Newton's method takes two
+/// steps to a foot in the `last` round: with one, the error near the pole of a sphere does not fall. Before, one will do.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -174,14 +176,17 @@ fn find(
     from: usize,
     tile: &Tile<'_>,
     size: [usize; 2],
+    last: bool,
     feet: &mut Feet,
 ) -> u8 {
     let mut course = Course::default();
     for row in 0..SIDE {
-        if tile.cone.is_some() {
-            find_line::<true>(around, (from, row), tile, feet, &mut course);
-        } else {
-            find_line::<false>(around, (from, row), tile, feet, &mut course);
+        let at = (from, row);
+        match (tile.cone.is_some(), last) {
+            (true, true) => find_line::<true, 2>(around, at, tile, feet, &mut course),
+            (true, false) => find_line::<true, 1>(around, at, tile, feet, &mut course),
+            (false, true) => find_line::<false, 2>(around, at, tile, feet, &mut course),
+            (false, false) => find_line::<false, 1>(around, at, tile, feet, &mut course),
         }
     }
     course.set(feet, size)
@@ -189,7 +194,7 @@ fn find(
 
 /// Finds the feet of a row of a tile.
 #[inline(always)]
-fn find_line<const IN_CONE: bool>(
+fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
     Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
     at: (usize, usize),
     tile: &Tile<'_>,
@@ -250,7 +255,7 @@ fn find_line<const IN_CONE: bool>(
                 triangle.mirror_place([origin[0] + i as f32, origin[1]]),
             ),
         };
-        let (theta, rho) = foot.minimise::<IN_CONE>();
+        let (theta, rho) = foot.minimise::<IN_CONE, NEWTON_STEPS>();
         // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
         triangles[i] = if fixed { Triangle::NONE } else { bits };
