@@ -1,5 +1,7 @@
 //! The figures of Seong, Jeong and Cohen (2008): what each of them claims.
 
+#[path = "../examples/figures/face.rs"]
+mod face;
 #[allow(dead_code, reason = "the example uses the rest")]
 #[path = "../examples/figure_6/four_bumps.rs"]
 mod four_bumps;
@@ -7,6 +9,9 @@ mod four_bumps;
 mod half_cylinders;
 #[path = "../examples/figures/parametrisations.rs"]
 mod parametrisations;
+#[allow(dead_code, reason = "the examples use the rest")]
+#[path = "../examples/figures/parts.rs"]
+mod parts;
 #[path = "../examples/figures/shapes.rs"]
 mod shapes;
 #[allow(dead_code, reason = "the example uses the rest")]
@@ -133,5 +138,90 @@ mod figure_6 {
         let (gaussian, larger) = curvatures(&surface(&terrain().unwrap()).unwrap());
         assert_eq!(total_curvature_watershed(&gaussian), 9);
         assert_eq!(marching_between_walls(&larger), 5);
+    }
+}
+
+mod figure_1 {
+    use glam::DVec2;
+    use ridgeway::Route;
+
+    use crate::face;
+
+    /// The curvature route costs less under its own metric and turns less; the isolines differ in shape.
+    #[test]
+    fn the_curvature_route_goes_where_the_face_is_smooth() {
+        let terrain = face::face().unwrap();
+        let comparison = face::routes(&terrain).unwrap();
+        let [geodesic, curvature] = &comparison.routes[..] else { panic!("two routes") };
+        assert!(comparison.costs[1][1] < 0.75 * comparison.costs[1][0]);
+        assert!(comparison.costs[0][0] < 0.9 * comparison.costs[0][1]);
+        let turn = |route: &Route| route.summary.total_normal_curvature_rad;
+        assert!(turn(curvature) < 0.5 * turn(geodesic));
+        // To the cheek below the eye and to the crown: about as far on the ground.
+        let [isotropic, bent] = [0, 1].map(|metric| {
+            let at = |x: f64, y: f64| {
+                let at = terrain.frame().to_grid(DVec2::new(x, y));
+                comparison.distances[metric].at(at).unwrap()
+            };
+            at(-20.0, 5.0) / at(5.0, 60.0)
+        });
+        assert!(bent > 1.2 * isotropic, "{bent} {isotropic}");
+    }
+}
+
+mod figure_7 {
+    use crate::parts;
+
+    /// Like parts have like signatures: other size, section and parameters move them less than other parts lie away.
+    #[test]
+    fn like_parts_form_groups() {
+        let [nearest, silhouette] = parts::separation(&parts::points().unwrap());
+        assert!(nearest == 1.0 && silhouette > 0.7, "{nearest} {silhouette}");
+    }
+
+    #[test]
+    fn parameters_do_not_matter() {
+        let ([knight, twin], _) = parts::knights().unwrap();
+        for (a, b) in knight.signatures.iter().zip(&twin.signatures) {
+            assert!(a.distance(b) < 0.03, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn the_four_bumps_are_alike() {
+        let bumps = parts::bumps().unwrap();
+        assert_eq!(bumps.signatures.len(), 4);
+        for other in &bumps.signatures[1..] {
+            assert!(bumps.signatures[0].distance(other) < 0.03);
+        }
+    }
+}
+
+mod figure_9 {
+    use ridgeway::region::matches;
+
+    use crate::parts;
+
+    /// Each part of a letter matches that part of a letter 1.7 times as large with another section.
+    #[test]
+    fn parts_of_letters_match() {
+        let ([first, second], _) = parts::letters().unwrap();
+        let found = matches(&first.signatures, &second.signatures, false).unwrap();
+        assert_eq!(found.len(), 3);
+        for pair in found {
+            assert!(pair.first == pair.second && pair.mutual, "{pair:?}");
+            assert!((pair.size_ratio / 1.7 - 1.0).abs() < 0.05, "{pair:?}");
+        }
+    }
+
+    /// Of all parts the ant's tail and the bishop's head are the most alike, though one is 0.6 times as large.
+    #[test]
+    fn the_tail_of_an_ant_matches_a_part_of_a_bishop() {
+        let ([ant, bishop], parts) = parts::pieces().unwrap();
+        let found = matches(&ant.signatures, &bishop.signatures, false).unwrap();
+        let best = found[0];
+        assert_eq!([parts[0][best.first], parts[1][best.second]], ["tail"; 2]);
+        assert!(best.mutual && best.distance < 0.07, "{best:?}");
+        assert!((best.size_ratio / 0.6 - 1.0).abs() < 0.05, "{best:?}");
     }
 }
