@@ -89,14 +89,15 @@ pub(crate) fn pieces() -> Result<Pair> {
     let tail = arc(0.0, [0.5, 0.75], [55.0, -90.0]);
     let ant: Vec<_> = head.chain(thorax).chain(tail).collect();
     let head = arc(2.6, [0.3, 0.45], [90.0, -55.0]);
-    let stem = [[0.13, 2.0], [0.15, 1.7], [0.2, 1.3], [0.3, 0.9], [0.45, 0.5]];
+    let bead = arc(1.82, [0.162, 0.21], [45.0, -45.0]);
+    let stem = [[0.15, 1.4], [0.2, 1.1], [0.3, 0.8], [0.45, 0.5]];
     let foot = arc(0.1, [0.6, 0.2], [20.0, -45.0]);
-    let bishop: Vec<_> = head.chain(stem).chain(foot).collect();
+    let bishop: Vec<_> = head.chain(bead).chain(stem).chain(foot).collect();
     let cuts = [
         Cut::by_rings("ant", turned(&ant, [96, 200])?, &[0.8, 0.38, 0.16])?,
-        Cut::by_rings("bishop", turned(&bishop, [96, 200])?, &[0.2, 0.5, 0.9])?,
+        Cut::by_rings("bishop", turned(&bishop, [96, 200])?, &[0.15, 0.42, 0.8])?,
     ];
-    Ok((cuts, [&["tail", "thorax", "ant's head"], &["tail", "stem", "foot"]]))
+    Ok((cuts, [&["tail", "thorax", "ant's head"], &["tail", "bead", "foot"]]))
 }
 
 /// Radius and height on an ellipse around the axis, between two angles in degrees above its equator.
