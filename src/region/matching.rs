@@ -34,10 +34,10 @@ pub fn matches(first: &[Signature], second: &[Signature], sized: bool) -> Result
     greedy(first, second, pairs, |j| offset + j, sized)
 }
 
-/// Matches regions of one surface with each other, as [`matches`].
+/// Matches regions of one surface with each other, as [`matches()`].
 ///
 /// # Errors
-/// As [`matches`].
+/// As [`matches()`].
 pub fn matches_within(regions: &[Signature], sized: bool) -> Result<Vec<Match>> {
     let count = regions.len();
     let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
