@@ -470,6 +470,7 @@ pub(super) fn ceiling(seed: f32, shortest_step: f32) -> f32 {
 }
 
 /// See [`Bench::sweep`]. No fused multiply-add, so every instruction set gives the same bits.
+/// One function for each rule, in and out of a cone: one that chooses inside was 2 to 4 % slower.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
