@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::field::{AREA, TensorTile};
 use super::source::{self, Seeds};
-use super::tiles::{self, Equation, News, Solution, Statistics};
+use super::tiles::{self, Equation, NEIGHBOURS, News, Solution, Statistics, Values, neighbour};
 use super::update::UNREACHED;
 use super::{Cones, DistanceMap, Solver, Stop, TensorField};
 use crate::{Control, MetricField, Result, Sym2};
@@ -21,7 +21,8 @@ impl Solver {
     ///
     /// Costs the sampling of the metric and a comparison of all tensors; [`update_nodes`](Self::update_nodes) costs
     /// neither. All is solved again if `map` is of [`Accuracy::High`](super::Accuracy), whose values say nothing of what they came from, or
-    /// where the ground around a start changed so that another cone fans out from it.
+    /// where the ground around a start changed so that another cone fans out from it, or next to a start that
+    /// another way passes over.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -98,6 +99,7 @@ impl Solver {
         if map.errors.is_some() || Cones::new(&map.field, &map.starts) != map.cones {
             return self.solve_again(map, stop, control);
         }
+        let contested = contested(&map.values, &before);
         let lost = clear(&mut map, &changed);
         let equation = Equation {
             field: &map.field,
@@ -110,8 +112,14 @@ impl Solver {
         let Solution { values, limits, statistics: forgetting } = left.expect(
             "settles: a tile is looked at again only where a node of it or around it was forgotten",
         );
-        let map =
-            self.go_on(DistanceMap { values, limits, ..map }, &lost, &seeds, stop, control)?;
+        let map = DistanceMap { values, limits, ..map };
+        let is_touched = |&(tile, reached): &(usize, usize)| {
+            lost[tile] < f32::INFINITY || count_reached(&map.values, tile) != reached
+        };
+        if contested.iter().any(is_touched) {
+            return self.solve_again(map, stop, control);
+        }
+        let map = self.go_on(map, &lost, &seeds, stop, control)?;
         let statistics = Statistics {
             activations: forgetting.activations + map.statistics.activations,
             sweeps: forgetting.sweeps + map.statistics.sweeps,
@@ -149,9 +157,32 @@ fn moved_seeds<'a>(
     })
 }
 
-/// Takes the values of these nodes away; for each tile the least of them.
+/// The tiles in and beside which a start is passed over by a quicker way, with how many nodes of each have a value.
+///
+/// Such a node jumps down from its own value, see [`ceiling`](super::update::ceiling). On obtuse metrics it may then hold up the very nodes
+/// that brought it down, so that what it came from must not be taken away alone.
+fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize)> {
+    let is_contested = |tile: &usize| {
+        let pairs = seeds[*tile].iter().flat_map(|seeds| seeds.iter()).zip(&values.tiles[*tile]);
+        pairs.into_iter().any(|(&seed, &value)| seed < UNREACHED && value < seed)
+    };
+    let tiles = (0..seeds.len()).filter(is_contested).flat_map(|tile| around(values, tile));
+    tiles.map(|tile| (tile, count_reached(values, tile))).collect()
+}
+
+/// A tile and its neighbours.
+fn around(values: &Values, tile: usize) -> impl Iterator<Item = usize> + '_ {
+    let beside = move |(dx, dy)| neighbour(&values.tiling, tile, dx, dy);
+    std::iter::once(tile).chain(NEIGHBOURS.into_iter().filter_map(beside))
+}
+
+fn count_reached(values: &Values, tile: usize) -> usize {
+    values.tiles[tile].iter().filter(|&&value| value < UNREACHED).count()
+}
+
+/// Takes the values of these nodes away; for each tile the least of them, or of those that a stop took away.
 fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
-    let mut lost = vec![f32::INFINITY; map.values.tiles.len()];
+    let mut lost = stopped(&map.values);
     for &(tile, place) in nodes {
         let value = &mut map.values.tiles[tile][place];
         lost[tile] = lost[tile].min(value.min(UNREACHED));
@@ -159,4 +190,15 @@ fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
         *value = if open { UNREACHED } else { f32::INFINITY };
     }
     lost
+}
+
+/// [`UNREACHED`] for each tile where a stopped solve took away what a value may have come from: on obtuse metrics that
+/// is a segment of which one end may be farther than the node itself.
+fn stopped(values: &Values) -> Vec<f32> {
+    let is_front = |tile: usize| {
+        values.tiles[tile].contains(&UNREACHED)
+            && around(values, tile).any(|tile| count_reached(values, tile) > 0)
+    };
+    let key = |tile| if is_front(tile) { UNREACHED } else { f32::INFINITY };
+    (0..values.tiles.len()).into_par_iter().map(key).collect()
 }

@@ -158,6 +158,27 @@ fn edits_at_the_start_move_it_or_leave_none() {
 }
 
 #[test]
+fn what_a_stop_took_away_supports_nothing() {
+    // Obtuse: some nodes have their value from a segment of which one end is farther than they are, even beyond the stop;
+    // what closes the way to there closes the way to them.
+    let f = field(60, 50, |c, r| Some(rotated(80.0, 0.3 + 0.1 * (c + 2 * r) as f64)));
+    let start = DVec2::new(20.0, 18.4);
+    let whole = solve_from(f.clone(), &[(start, 0.0)], &Stop::Never);
+    for distance in [10.0, 14.0] {
+        let beyond =
+            |&(col, row): &_| (distance..distance + 0.6).contains(&whole.at_node(col, row));
+        let nodes = (0..50).flat_map(|row| (0..60).map(move |col| (col, row)));
+        for (col, row) in nodes.filter(beyond) {
+            let (stop, edit) = (Stop::Distance(distance), vec![(col, row, None)]);
+            let [update, fresh] =
+                both(&Solver::default(), &f, &[start.into()], &edit, &stop).unwrap();
+            let difference = difference(&update, &fresh);
+            assert!(difference < 2e-3, "{distance}: {difference:e}");
+        }
+    }
+}
+
+#[test]
 fn whole_fields_are_compared_and_other_shapes_solved() {
     let (solver, control) = (Solver::default(), Control::default());
     let (f, start) = (turning(120), DVec2::new(30.0, 60.0));
