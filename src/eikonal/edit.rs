@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::field::{AREA, TensorTile};
 use super::source::{self, Seeds};
-use super::tiles::{self, Equation, NEIGHBOURS, News, Solution, Statistics, Values, neighbour};
+use super::tiles::{self, Equation, News, Solution, Statistics, Values, neighbours};
 use super::update::UNREACHED;
 use super::{Cones, DistanceMap, Solver, Stop, TensorField};
 use crate::{Control, MetricField, Result, Sym2};
@@ -172,8 +172,7 @@ fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize
 
 /// A tile and its neighbours.
 fn around(values: &Values, tile: usize) -> impl Iterator<Item = usize> + '_ {
-    let beside = move |(dx, dy)| neighbour(&values.tiling, tile, dx, dy);
-    std::iter::once(tile).chain(NEIGHBOURS.into_iter().filter_map(beside))
+    std::iter::once(tile).chain(neighbours(&values.tiling, tile).map(|(_, n)| n))
 }
 
 fn count_reached(values: &Values, tile: usize) -> usize {

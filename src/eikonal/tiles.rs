@@ -201,10 +201,8 @@ impl Queue {
             taken.push(Job { tile, sides: self.sides[i], first: self.first[i] });
             self.key[i] = f32::INFINITY;
             self.taken[i] = round;
-            for (dx, dy) in NEIGHBOURS {
-                if let Some(n) = neighbour(tiling, i, dx, dy) {
-                    self.taken[n] = round;
-                }
+            for (_, n) in neighbours(tiling, i) {
+                self.taken[n] = round;
             }
         }
         taken.sort_unstable_by_key(|job| job.tile);
@@ -228,6 +226,16 @@ pub(super) fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> O
     let x = wrap((tile % tiling.across) as isize + dx, tiling.across, across)?;
     let y = wrap((tile / tiling.across) as isize + dy, tiling.down, down)?;
     Some(y * tiling.across + x)
+}
+
+/// The neighbours of a tile, each with its side.
+pub(super) fn neighbours(tiling: &Tiling, tile: usize) -> impl Iterator<Item = (usize, usize)> {
+    let &Tiling { across, down, periodic, .. } = tiling;
+    let (x, y) = ((tile % across) as isize, (tile / across) as isize);
+    NEIGHBOURS.into_iter().enumerate().filter_map(move |(side, (dx, dy))| {
+        let (x, y) = (wrap(x + dx, across, periodic[0])?, wrap(y + dy, down, periodic[1])?);
+        Some((side, y * across + x))
+    })
 }
 
 /// What the solvers of a round share.
@@ -363,10 +371,8 @@ fn wake_start(field: &TensorField, seeds: &[Option<Box<Seeds>>], queue: &mut Que
 fn wake_around(tiling: &Tiling, keys: impl Iterator<Item = f32>, queue: &mut Queue) {
     for (tile, key) in keys.enumerate().filter(|&(_, key)| key < f32::INFINITY) {
         queue.wake(tile, key, ITSELF);
-        for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
-            if let Some(n) = neighbour(tiling, tile, dx, dy) {
-                queue.wake(n, key, opposite(side));
-            }
+        for (side, n) in neighbours(tiling, tile) {
+            queue.wake(n, key, opposite(side));
         }
     }
 }
@@ -377,8 +383,7 @@ fn wake_front(tiling: &Tiling, before: &Values, board: &Board, edited: &[f32], q
     let is_edited = |tile: usize| edited.get(tile).is_some_and(|&key| key < f32::INFINITY);
     let mut block = [[f32::INFINITY; SIDE + 2]; SIDE + 2];
     for (tile, before) in before.tiles.iter().enumerate() {
-        let around = |(dx, dy)| neighbour(tiling, tile, dx, dy).is_some_and(is_edited);
-        let all = SIDES.into_iter().any(around);
+        let all = is_edited(tile) || neighbours(tiling, tile).any(|(_, n)| is_edited(n));
         if !all && !before.contains(&UNREACHED) {
             continue;
         }
@@ -399,7 +404,7 @@ fn wake_front(tiling: &Tiling, before: &Values, board: &Board, edited: &[f32], q
 }
 
 /// The side on which the neighbour sees this tile.
-fn opposite(side: usize) -> usize {
+pub(super) fn opposite(side: usize) -> usize {
     (side + 4) % 8
 }
 
@@ -411,12 +416,9 @@ fn settle(tiling: &Tiling, queue: &mut Queue, tile: usize, outcome: &Outcome) {
     if outcome.unsettled < f32::INFINITY {
         queue.wake(tile, outcome.unsettled, ITSELF);
     }
-    for (side, &key) in outcome.wakes.iter().enumerate() {
-        let (dx, dy) = NEIGHBOURS[side];
-        if key < f32::INFINITY
-            && let Some(n) = neighbour(tiling, tile, dx, dy)
-        {
-            queue.wake(n, key, opposite(side));
+    for (side, n) in neighbours(tiling, tile) {
+        if outcome.wakes[side] < f32::INFINITY {
+            queue.wake(n, outcome.wakes[side], opposite(side));
         }
     }
 }

@@ -59,7 +59,7 @@ impl Default for Surroundings {
 }
 
 impl Surroundings {
-    /// Finds the feet of tiles side by side, `first` and those after it, and the neighbours of each that it reads, one bit
+    /// Finds the feet of tiles side by side, `first` and those after it, given those of the round before, and the neighbours of each that it reads, one bit
     /// each as in [`RING`].
     pub(super) fn find(
         &mut self,
@@ -92,8 +92,7 @@ impl Surroundings {
             let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
             let seeds = input.seeds[tile].as_deref();
             let tile = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
-            let last = input.total.is_some();
-            *reads = find(self, k * SIDE, &tile, size, last, feet);
+            *reads = find(self, k * SIDE, &tile, size, input.total.is_some(), feet);
         }
     }
 }
@@ -164,8 +163,8 @@ fn rises<const N: usize>(
     rises
 }
 
-/// Finds the feet of the tile of a size that begins at column `from`; the neighbours that it reads. Newton's method takes two
-/// steps to a foot in the `last` round: with one, the error near the pole of a sphere does not fall. Before, one will do.
+/// Finds the feet of the tile of a size that begins at column `from`, if `again` from those of the round before; the neighbours
+/// that it reads. A function for each case: one that reads the feet in the first round too was 3 % slower.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -176,17 +175,20 @@ fn find(
     from: usize,
     tile: &Tile<'_>,
     size: [usize; 2],
-    last: bool,
+    again: bool,
     feet: &mut Feet,
 ) -> u8 {
     let mut course = Course::default();
+    if again && feet.by_columns {
+        feet.transpose();
+    }
     for row in 0..SIDE {
         let at = (from, row);
-        match (tile.cone.is_some(), last) {
-            (true, true) => find_line::<true, 2>(around, at, tile, feet, &mut course),
-            (true, false) => find_line::<true, 1>(around, at, tile, feet, &mut course),
-            (false, true) => find_line::<false, 2>(around, at, tile, feet, &mut course),
-            (false, false) => find_line::<false, 1>(around, at, tile, feet, &mut course),
+        match (tile.cone.is_some(), again) {
+            (true, true) => find_line::<true, true>(around, at, tile, feet, &mut course),
+            (true, false) => find_line::<true, false>(around, at, tile, feet, &mut course),
+            (false, true) => find_line::<false, true>(around, at, tile, feet, &mut course),
+            (false, false) => find_line::<false, false>(around, at, tile, feet, &mut course),
         }
     }
     course.set(feet, size)
@@ -194,7 +196,7 @@ fn find(
 
 /// Finds the feet of a row of a tile.
 #[inline(always)]
-fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
+fn find_line<const IN_CONE: bool, const AGAIN: bool>(
     Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
     at: (usize, usize),
     tile: &Tile<'_>,
@@ -220,6 +222,10 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
     let (g, det) = (seen(g, at, own), seen(det, at, own));
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
     let dets = lanes(&tile.tensors.det, row * SIDE);
+    let places = row * SIDE..(row + 1) * SIDE;
+    let mut old_triangles = [0u8; SIDE];
+    old_triangles.copy_from_slice(&feet.triangle[places.clone()]);
+    let old_thetas = lanes(&feet.theta, row * SIDE);
     let (mut triangles, mut thetas, mut rhos) = ([0u32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
         let ring = around_node(&ring, i);
@@ -254,8 +260,9 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
                 triangle.mirror(m0),
                 triangle.mirror_place([origin[0] + i as f32, origin[1]]),
             ),
+            known: choose(AGAIN & (bits == u32::from(old_triangles[i])), old_thetas[i], -1.0),
         };
-        let (theta, rho) = foot.minimise::<IN_CONE, NEWTON_STEPS>();
+        let (theta, rho) = foot.minimise::<IN_CONE>();
         // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
         triangles[i] = if fixed { Triangle::NONE } else { bits };
@@ -263,7 +270,6 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
         rhos[i] = choose(fixed, 0.0, rho);
     }
     course.add(row, &triangles, &thetas);
-    let places = row * SIDE..(row + 1) * SIDE;
     feet.theta[places.clone()].copy_from_slice(&thetas);
     feet.rho[places.clone()].copy_from_slice(&rhos);
     for (to, triangle) in feet.triangle[places].iter_mut().zip(triangles) {

@@ -27,7 +27,12 @@ pub(super) fn fill<'a>(
     if tiling.is_over_seam(first, tiles, MARGIN) {
         return fill_over_seam(strip, tiling, first, outside, values);
     }
-    *strip = [[outside; WIDE]; HIGH];
+    let (x, y) = (first % tiling.across, first / tiling.across);
+    // What is copied covers all but beyond the grid.
+    let surrounded = x > 0 && x + tiles < tiling.across && y > 0 && y + 1 < tiling.down;
+    if !surrounded || tiles < STRIP {
+        *strip = [[outside; WIDE]; HIGH];
+    }
     let rows = [(-1, SIDE - MARGIN..SIDE, 0), (0, 0..SIDE, MARGIN), (1, 0..MARGIN, MARGIN + SIDE)];
     for (dy, from, to) in rows {
         for k in 0..tiles + 2 {

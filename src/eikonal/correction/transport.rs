@@ -6,11 +6,10 @@ use multiversion::multiversion;
 
 use super::super::board::Board;
 use super::super::crew;
-use super::super::field::{AREA, SIDE, TensorField};
-use super::super::tiles::{ITSELF, Job, NEIGHBOURS, Queue, Values, WINDOW_CELLS, neighbour};
+use super::super::field::{AREA, SIDE, TensorField, Tiling};
+use super::super::tiles::{ITSELF, Job, Queue, Values, WINDOW_CELLS, neighbours, opposite};
 use super::super::update::{ALL, Block, Lines, choose, lanes};
 use super::feet::{self, BEFORE, BEHIND, Feet};
-use super::strip::Lanes;
 use super::triangle::Triangle;
 use crate::{Control, Result};
 
@@ -28,7 +27,8 @@ struct Shared {
 #[derive(Default)]
 struct Outcome {
     settled: bool,
-    changed: bool,
+    /// The neighbours beside which something changed, one bit each as in [`RING`](super::super::update::RING).
+    changed: u8,
 }
 
 /// The feet of a field's tiles: what the transport follows.
@@ -57,7 +57,7 @@ pub(super) fn carry(
     let shared = Shared { e, queue: Queue::new(tiles), taken: Vec::new() };
     let work = |_: &mut (), shared: &Shared, index: usize| {
         let tile = shared.taken[index].tile as usize;
-        carry_tile(&feet[tile], &shared.e, tile, tolerance)
+        carry_tile(&tiling, &feet[tile], &shared.e, tile, tolerance)
     };
     let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| {
         control.check()?;
@@ -73,13 +73,9 @@ pub(super) fn carry(
             if !outcome.settled {
                 wake(tile);
             }
-            if outcome.changed {
-                for (side, (dx, dy)) in NEIGHBOURS.into_iter().enumerate() {
-                    if let Some(n) = neighbour(&tiling, tile, dx, dy)
-                        && reads[n] & 1 << ((side + 4) % 8) != 0
-                    {
-                        wake(n);
-                    }
+            for (side, n) in neighbours(&tiling, tile) {
+                if outcome.changed & 1 << side != 0 && reads[n] & 1 << opposite(side) != 0 {
+                    wake(n);
                 }
             }
         }
@@ -99,7 +95,7 @@ pub(super) fn carry(
 }
 
 /// Sweeps the correction through a tile until it stands still.
-fn carry_tile(feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
+fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
     let mut block = [[0.0; SIDE + 2]; SIDE + 2];
     e.load(tile, &mut block);
     // Nothing comes from beyond the grid.
@@ -114,9 +110,7 @@ fn carry_tile(feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
     let mut dirty = ALL;
     let mut outcome = Outcome::default();
     while dirty != 0 && sweeps < MOST_SWEEPS {
-        let changed;
-        (dirty, changed) = sweep(&mut block, feet, tolerance, descending, dirty);
-        outcome.changed |= changed;
+        dirty = sweep(&mut block, feet, tolerance, descending, dirty);
         descending = !descending;
         sweeps += 1;
     }
@@ -124,8 +118,29 @@ fn carry_tile(feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
     if feet.by_columns {
         transpose(&mut block);
     }
+    outcome.changed = changed_sides(tiling, e, tile, &block, tolerance);
     e.store(tile, &block);
     outcome
+}
+
+/// The sides, as in [`Outcome`], on which the block differs from the board by more than `tolerance`.
+fn changed_sides(tiling: &Tiling, e: &Board, tile: usize, block: &Block, tolerance: f32) -> u8 {
+    let [cols, rows] = tiling.size(tile);
+    let (east, south) = (cols - 1, rows - 1);
+    let changed = |col: usize, row: usize| {
+        (block[row + 1][col + 1] - e.at(tile, row * SIDE + col)).abs() > tolerance
+    };
+    let sides = [
+        (0..rows).any(|row| changed(east, row)),
+        changed(east, south),
+        (0..cols).any(|col| changed(col, south)),
+        changed(0, south),
+        (0..rows).any(|row| changed(0, row)),
+        changed(0, 0),
+        (0..cols).any(|col| changed(col, 0)),
+        changed(east, 0),
+    ];
+    sides.into_iter().enumerate().fold(0, |set, (side, bit)| set | u8::from(bit) << side)
 }
 
 /// Mirrors a block on its diagonal.
@@ -139,8 +154,7 @@ fn transpose(block: &mut Block) {
     }
 }
 
-/// One sweep over the lines in `dirty`; those that read what changed since by more than `tolerance`, and whether
-/// anything did.
+/// One sweep over the lines in `dirty`; those that read what changed since by more than `tolerance`.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -152,8 +166,7 @@ fn sweep(
     tolerance: f32,
     descending: bool,
     mut dirty: Lines,
-) -> (Lines, bool) {
-    let mut any = false;
+) -> Lines {
     for step in 0..SIDE {
         let row = if descending { SIDE - 1 - step } else { step };
         if dirty & 1 << row == 0 {
@@ -163,11 +176,10 @@ fn sweep(
         let reads = |line: usize, bit: u32| u32::from(feet.reads[line]) & bit != 0;
         // A line that reads itself is carried until it stands still before others read it.
         let most = if reads(row, feet::ITSELF) { SIDE } else { 1 };
-        let changes = (0..most).take_while(|_| carry_line(block, feet, row, tolerance)).count();
+        let changes = carry_line(block, feet, row, most, tolerance);
         if changes == 0 {
             continue;
         }
-        any = true;
         if row > 0 && reads(row - 1, BEHIND) {
             dirty |= 1 << (row - 1);
         }
@@ -178,29 +190,50 @@ fn sweep(
             dirty |= 1 << row;
         }
     }
-    (dirty, any)
+    dirty
 }
 
-/// Carries the correction to the nodes of a line; whether one changed by more than `tolerance`.
+/// Carries the correction to the nodes of a line, `most` times or until none changes by more than `tolerance`; the number of
+/// times one did.
 #[inline(always)]
-fn carry_line(block: &mut Block, feet: &Feet, row: usize, tolerance: f32) -> bool {
+fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance: f32) -> usize {
     let [above, here, below] = [&block[row], &block[row + 1], &block[row + 2]];
-    let (e, w, s, n) = (lanes(here, 2), lanes(here, 0), lanes(below, 1), lanes(above, 1));
+    let (s, n) = (lanes(below, 1), lanes(above, 1));
     let (se, nw, ne, sw) = (lanes(below, 2), lanes(above, 0), lanes(above, 2), lanes(below, 0));
-    let old = lanes(here, 1);
+    let mut old = lanes(here, 1);
     let (theta, rho) = (lanes(&feet.theta, row * SIDE), lanes(&feet.rho, row * SIDE));
     let mut triangles = [0u8; SIDE];
     triangles.copy_from_slice(&feet.triangle[row * SIDE..(row + 1) * SIDE]);
-    let mut new: Lanes = [0.0; SIDE];
-    let mut changed = 0;
+    // What comes from the lines beside, and the shares of the neighbours east and west in the line itself.
+    let (mut beside, mut from_east, mut from_west) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
         let bits = u32::from(triangles[i]);
         let triangle = Triangle::from_bits(bits);
-        let ring = [e[i], se[i], s[i], sw[i], w[i], nw[i], n[i], ne[i]];
-        let (a, b) = (triangle.axis(ring), triangle.diagonal(ring));
-        new[i] = choose(bits & Triangle::NONE != 0, old[i], a + theta[i] * (b - a) + rho[i]);
-        changed |= u32::from((new[i] - old[i]).abs() > tolerance);
+        let moves = bits & Triangle::NONE == 0;
+        let b = triangle.diagonal([0.0, se[i], 0.0, sw[i], 0.0, nw[i], 0.0, ne[i]]);
+        let across = choose(triangle.negative, n[i], s[i]);
+        let own = 1.0 - theta[i];
+        let a = choose(triangle.along_y, own * across, 0.0);
+        beside[i] = choose(moves, a + theta[i] * b + rho[i], old[i]);
+        let along = choose(moves & !triangle.along_y, own, 0.0);
+        from_west[i] = choose(triangle.negative, along, 0.0);
+        from_east[i] = along - from_west[i];
     }
-    block[row + 1][1..=SIDE].copy_from_slice(&new);
-    changed != 0
+    let line = &mut block[row + 1];
+    let mut changes = 0;
+    while changes < most {
+        let (e, w) = (lanes(line, 2), lanes(line, 0));
+        let mut changed = 0;
+        for i in 0..SIDE {
+            let new = beside[i] + from_east[i] * e[i] + from_west[i] * w[i];
+            changed |= u32::from((new - old[i]).abs() > tolerance);
+            old[i] = new;
+        }
+        line[1..=SIDE].copy_from_slice(&old);
+        if changed == 0 {
+            break;
+        }
+        changes += 1;
+    }
+    changes
 }

@@ -296,6 +296,25 @@ fn labels_stops_and_resuming_work_around_the_seam() {
 }
 
 #[test]
+fn an_edit_is_felt_over_the_seam() {
+    let start = DVec2::new(58.0, 40.0);
+    for directions in CLOSED {
+        let f = closed(60, 80, directions, wavy(60, 80, 25.0));
+        let map = solve_as(Accuracy::Fast, f.clone(), &[start.into()]);
+        let wall: Vec<_> = (0..30).map(|row| (1, 25 + row, None)).collect();
+        let update =
+            Solver::default().update_nodes(map, &wall, &Stop::Never, &Control::default()).unwrap();
+        let mut edited = f;
+        wall.iter().for_each(|&(col, row, tensor)| edited.set(col, row, tensor).unwrap());
+        let fresh = solve_as(Accuracy::Fast, edited, &[start.into()]);
+        let pairs = update.to_row_major().into_iter().zip(fresh.to_row_major());
+        for (a, b) in pairs.filter(|(a, b)| a != b) {
+            assert!((a - b).abs() < 1e-3 * b, "{directions:?}: {a} {b}");
+        }
+    }
+}
+
+#[test]
 fn too_few_nodes_and_too_many_turns_are_errors() {
     for directions in CLOSED {
         let [cols, rows] = directions.map(|periodic| if periodic { 2 } else { 9 });
