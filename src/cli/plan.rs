@@ -57,7 +57,12 @@ impl<'a> Journey<'a> {
             Some(path) => Some(costs(path, &terrain)?),
             None => None,
         };
-        let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
+        let surface = HeightSurface::fit(&terrain, &args.fit.options(), control).map_err(
+            |error| match error {
+                Error::Usage(message) => Error::format(dem, message),
+                error => error,
+            },
+        )?;
         let start_names = start.iter().map(Place::to_string).collect();
         Ok(Self {
             args,

@@ -21,8 +21,8 @@ const PALETTE: [Rgb; 10] = [
     Rgb(0xfc, 0xcd, 0xe5),
 ];
 
-/// Largest and smallest size of a region's number, in pixels of a picture of the default size.
-const NUMBER: [f32; 2] = [30.0, 15.0];
+/// Largest size of a region's number, in pixels of a picture of the default size.
+const NUMBER: f32 = 30.0;
 /// No number is smaller than this in any picture, pixels.
 const LEGIBLE: f32 = 10.0;
 /// Radius and rim of the mark of a seed.
@@ -79,28 +79,27 @@ impl RegionLayer<'_> {
                 pixels[y * width..][columns].fill(None);
             }
         }
-        draw_numbers(&mut sheet.canvas, &pixels, [left, top, width], sheet.unit);
+        draw_numbers(&mut sheet.canvas, &pixels, [left, top, width], NUMBER * sheet.unit);
     }
 }
 
 /// Writes the number of each region, counted from 1, into the middle of its roomiest place, where it has one. `pixels` are the regions of a
-/// part of the canvas of so many columns, `left` and `top` its corner.
+/// part of the canvas of so many columns, `left` and `top` its corner; sizes are between `largest` and half of it.
 pub(super) fn draw_numbers(
     canvas: &mut Canvas,
     pixels: &[Option<u32>],
     [left, top, width]: [usize; 3],
-    unit: f32,
+    largest: f32,
 ) {
-    let [most, least] = NUMBER.map(|size| (size * unit).max(LEGIBLE));
     for (region, room) in rooms(pixels, width).into_iter().enumerate() {
         let number = (region + 1).to_string();
         // Half of the text per pixel of its size; half of DejaVu's capital height, 0.729 em, centres it.
         let half = Vec2::new(0.5 * text::width(&number, 1.0), 0.365);
-        let size = most.min(0.9 * room.half / half.max_element());
-        if size >= least {
+        let size = largest.min(0.9 * room.half / half.max_element());
+        if size >= LEGIBLE.max(0.5 * largest) {
             let middle = room.middle + Vec2::new(left as f32, top as f32);
             let baseline = middle + size * Vec2::new(-half.x, half.y);
-            canvas.text(&number, size, baseline, Rgb::INK, 2.5 * unit);
+            canvas.text(&number, size, baseline, Rgb::INK, largest / 12.0);
         }
     }
 }

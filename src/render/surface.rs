@@ -346,12 +346,7 @@ impl Film {
         let pixels: Vec<_> = (0..width * height)
             .map(|i| self.regions[i / width * SAMPLES * self.width + i % width * SAMPLES])
             .collect();
-        draw_numbers(
-            &mut canvas,
-            &pixels,
-            [0, head, width],
-            width.max(height) as f32 / SIDE as f32,
-        );
+        draw_numbers(&mut canvas, &pixels, [0, head, width], text_size);
         let title = text::fitted(title, text_size, 0.94 * width as f32);
         canvas.text(
             &title,

@@ -206,7 +206,12 @@ fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
 fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
     let mut text = String::new();
     for subject in subjects {
-        text += &format!("{}: {} regions\n", title(subject.path), subject.signatures.len());
+        let count = subject.signatures.len();
+        let noun = if count == 1 { "region" } else { "regions" };
+        text += &format!("{}: {count} {noun}\n", title(subject.path));
+    }
+    if found.is_empty() {
+        return text + "one region alone matches none; cut finer by --epsilon or --levels\n";
     }
     let mut table = Table::default();
     let header = ["", "first", "second", "unlike", "size", "size", "ratio", "best of all"];
