@@ -3,10 +3,12 @@
 //! The geodesic goes straight over brow, eye and nose. The curvature route goes where the face is smooth; its isolines
 //! crowd where the face bends.
 //!
-//! `cargo run --release --example figure_1 [picture.png]`
+//! `cargo run --release --example figure_1 [FOLDER]` draws both into FOLDER or `target/figures`.
 
 #[path = "figures/face.rs"]
 mod face;
+#[path = "figures/output.rs"]
+mod output;
 
 use ridgeway::Error;
 use ridgeway::export::isolines;
@@ -26,7 +28,6 @@ fn main() -> Result<(), Error> {
             comparison.ratio(1, r)
         );
     }
-    let Some(path) = std::env::args().nth(1) else { return Ok(()) };
     let frame = terrain.frame();
     let mut picture = MapPicture::new(frame, terrain.heights());
     picture.title = "A face: geodesic and curvature route, with their isolines".to_owned();
@@ -50,5 +51,5 @@ fn main() -> Result<(), Error> {
         let label = format!("{metric} distance");
         picture.isolines.push(IsolineLayer { isolines: rings, colour, label });
     }
-    std::fs::write(&path, picture.png()?).map_err(|source| Error::io(&path, source))
+    output::save("figure-1.png", &picture.png()?)
 }

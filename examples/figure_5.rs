@@ -1,13 +1,13 @@
 //! Figure 5 of Seong, Jeong and Cohen (2008): distances on a knight-like surface and on the same surface with other parameters.
 //!
-//! `cargo run --release --example figure_5 [FOLDER]` prints how far they are apart, and writes pictures of both to FOLDER.
+//! `cargo run --release --example figure_5 [FOLDER]` prints how far they are apart, and draws both into FOLDER or `target/figures`.
 
+#[path = "figures/output.rs"]
+mod output;
 #[path = "figures/parametrisations.rs"]
 mod parametrisations;
 #[path = "figures/shapes.rs"]
 mod shapes;
-
-use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
 use ridgeway::export::{isolines, levels_by_step};
@@ -25,7 +25,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{:>4} × {:<4} {mean:.2e} {greatest:.2e}", 2 * n, n + 1);
         }
     }
-    let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else { return Ok(()) };
     let compared = parametrisations::compare(&Metric::Curvature(Delta::default()), 200)?;
     let mut pictures = Vec::new();
     for ((surface, map), title) in
@@ -48,7 +47,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         pictures.push(picture.render()?);
     }
-    std::fs::create_dir_all(&folder)?;
-    std::fs::write(folder.join("figure-5.png"), png(&beside(&pictures)?)?)?;
+    output::save("figure-5.png", &png(&beside(&pictures)?)?)?;
     Ok(())
 }

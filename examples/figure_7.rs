@@ -1,15 +1,15 @@
 //! Figure 7 of Seong, Jeong and Cohen (2008): signatures of the parts of several surfaces.
 //!
 //! `cargo run --release --example figure_7 [FOLDER]` prints λ of each part and how well like parts are told from others, and
-//! draws λ1 and λ2.
+//! draws λ1 and λ2 into FOLDER or `target/figures`.
 
+#[path = "figures/output.rs"]
+mod output;
 #[allow(dead_code, reason = "figure 9 uses the rest")]
 #[path = "figures/parts.rs"]
 mod parts;
 #[path = "figures/shapes.rs"]
 mod shapes;
-
-use std::path::PathBuf;
 
 use glam::DVec2;
 use ridgeway::render::{LogPlot, Mark, pair_colour};
@@ -24,7 +24,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [nearest, silhouette] = parts::separation(&points);
     println!("the nearest is of the same part: {nearest:.2}; mean silhouette: {silhouette:.2}");
 
-    let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else { return Ok(()) };
     let mut names: Vec<&str> = Vec::new();
     let mut plot = LogPlot {
         kinds: vec!["first surface".into(), "other size, section, parameters".into()],
@@ -45,7 +44,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             label: if is_new { point.part.into() } else { String::new() },
         });
     }
-    std::fs::create_dir_all(&folder)?;
-    std::fs::write(folder.join("figure-7.png"), plot.png()?)?;
+    output::save("figure-7.png", &plot.png()?)?;
     Ok(())
 }

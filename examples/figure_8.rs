@@ -1,10 +1,12 @@
 //! Figure 8 of Seong, Jeong and Cohen (2008): two half-cylinders divided between two seeds. On the curvature tensor the border lies
 //! wherever the seeds put it; on the difference tensor it is the seam.
 //!
-//! `cargo run --release --example figure_8 [picture.png]`
+//! `cargo run --release --example figure_8 [FOLDER]` prints how well each does, and draws them into FOLDER or `target/figures`.
 
 #[path = "figures/half_cylinders.rs"]
 mod half_cylinders;
+#[path = "figures/output.rs"]
+mod output;
 
 use glam::{DVec2, DVec3};
 use ridgeway::metric::{Difference, DifferenceForm};
@@ -32,7 +34,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{nodes} x {nodes}, {name}: {:.4}", divide(&surface, metric)?.1);
         }
     }
-    let Some(path) = std::env::args_os().nth(1) else { return Ok(()) };
     let surface = HalfCylinders { nodes: 100 };
     let mut pictures = Vec::new();
     for (name, metric) in &metrics {
@@ -50,6 +51,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         picture.title = format!("{name}; the line is the seam");
         pictures.push(picture.render()?);
     }
-    std::fs::write(path, png(&beside(&pictures)?)?)?;
+    output::save("figure-8.png", &png(&beside(&pictures)?)?)?;
     Ok(())
 }

@@ -1,15 +1,16 @@
 //! Figure 9 of Seong, Jeong and Cohen (2008): like parts found on surfaces of other size and shape.
 //!
 //! `cargo run --release --example figure_9 [FOLDER]` prints which parts are matched and what that takes, and draws the surfaces
-//! with the parts of a match in one colour.
+//! with the parts of a match in one colour into FOLDER or `target/figures`.
 
+#[path = "figures/output.rs"]
+mod output;
 #[allow(dead_code, reason = "figure 7 uses the rest")]
 #[path = "figures/parts.rs"]
 mod parts;
 #[path = "figures/shapes.rs"]
 mod shapes;
 
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DVec3;
@@ -18,7 +19,6 @@ use ridgeway::region::{Match, Neighbours, matches, signatures};
 use ridgeway::render::{Rgb, SurfacePicture, beside, pair_colour, png};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let folder = std::env::args_os().nth(1).map(PathBuf::from);
     let views = [DVec3::new(0.3, -1.0, 2.0), DVec3::new(1.0, -2.0, 1.0)];
     let pairs = [parts::letters()?, parts::pieces()?];
     for (((cuts, parts), view), name) in pairs.iter().zip(views).zip(["letters", "pieces"]) {
@@ -28,10 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let [a, b] = [parts[0][m.first], parts[1][m.second]];
             println!("  {a:<10} {b:<10} {:.3} {:.2}", m.distance, m.size_ratio);
         }
-        if let Some(folder) = &folder {
-            std::fs::create_dir_all(folder)?;
-            draw(cuts, &found, view, &folder.join(format!("figure-9-{name}.png")))?;
-        }
+        output::save(&format!("figure-9-{name}.png"), &draw(cuts, &found, view)?)?;
     }
     println!("nodes, metric with solve and labels ms, signatures ms");
     for nodes in [100, 1000] {
@@ -57,12 +54,7 @@ fn times(nodes: usize) -> Result<[f64; 2], ridgeway::Error> {
     Ok(fastest)
 }
 
-fn draw(
-    cuts: &[parts::Cut; 2],
-    found: &[Match],
-    view: DVec3,
-    path: &Path,
-) -> Result<(), Box<dyn std::error::Error>> {
+fn draw(cuts: &[parts::Cut; 2], found: &[Match], view: DVec3) -> Result<Vec<u8>, ridgeway::Error> {
     let mut pictures = Vec::new();
     for (side, cut) in cuts.iter().enumerate() {
         let rank = |region: usize| found.iter().position(|m| [m.first, m.second][side] == region);
@@ -72,9 +64,9 @@ fn draw(
         let colours: Vec<Rgb> = cut.labels.iter().map(colour).collect();
         let mut picture = SurfacePicture::new(&*cut.surface, &colours);
         (picture.blend, picture.view, picture.max_side_px) = (false, view, 800);
+        picture.regions = &cut.labels;
         picture.title = cut.name.into();
         pictures.push(picture.render()?);
     }
-    std::fs::write(path, png(&beside(&pictures)?)?)?;
-    Ok(())
+    png(&beside(&pictures)?)
 }

@@ -3,7 +3,10 @@
 //! A long ridge lies between start and goal. The geodesic goes straight over it; the curvature route, to which
 //! bending over the crest is dear, goes far along the ridge to where it is low, and crosses there.
 //!
-//! `cargo run --release --example ridge [picture.png]`
+//! `cargo run --release --example ridge [FOLDER]` prints their numbers, and draws them into FOLDER or `target/figures`.
+
+#[path = "figures/output.rs"]
+mod output;
 
 use glam::DVec2;
 use ridgeway::export::isolines;
@@ -56,31 +59,28 @@ fn main() -> Result<(), Error> {
             comparison.ratio(1, r)
         );
     }
-    if let Some(path) = std::env::args().nth(1) {
-        let mut picture = MapPicture::new(&frame, terrain.heights());
-        picture.title = "A ridge: geodesic and curvature route".to_owned();
-        let rings = comparison
-            .distances
-            .iter()
-            .map(|distance| {
-                let values = distance.to_row_major();
-                let farthest = values.iter().copied().fold(0.0, f32::max);
-                let levels: Vec<f64> =
-                    (1..20).map(|i| f64::from(farthest) * f64::from(i) / 20.0).collect();
-                isolines(&frame, &values, &levels)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        for ((route, rings), colour) in
-            comparison.routes.iter().zip(&rings).zip([Rgb::BLUE, Rgb::ORANGE])
-        {
-            let label = format!("{} route: {:.0} m", route.summary.metric, route.summary.length_m);
-            picture.routes.push(RouteLayer { grid: &route.grid, colour, label });
-            let label = format!("{} distance", route.summary.metric);
-            picture.isolines.push(IsolineLayer { isolines: rings, colour, label });
-        }
-        picture.starts = vec![start];
-        picture.goals = vec![goal];
-        std::fs::write(&path, picture.png()?).map_err(|source| Error::io(&path, source))?;
+    let mut picture = MapPicture::new(&frame, terrain.heights());
+    picture.title = "A ridge: geodesic and curvature route".to_owned();
+    let rings = comparison
+        .distances
+        .iter()
+        .map(|distance| {
+            let values = distance.to_row_major();
+            let farthest = values.iter().copied().fold(0.0, f32::max);
+            let levels: Vec<f64> =
+                (1..20).map(|i| f64::from(farthest) * f64::from(i) / 20.0).collect();
+            isolines(&frame, &values, &levels)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    for ((route, rings), colour) in
+        comparison.routes.iter().zip(&rings).zip([Rgb::BLUE, Rgb::ORANGE])
+    {
+        let label = format!("{} route: {:.0} m", route.summary.metric, route.summary.length_m);
+        picture.routes.push(RouteLayer { grid: &route.grid, colour, label });
+        let label = format!("{} distance", route.summary.metric);
+        picture.isolines.push(IsolineLayer { isolines: rings, colour, label });
     }
-    Ok(())
+    picture.starts = vec![start];
+    picture.goals = vec![goal];
+    output::save("ridge.png", &picture.png()?)
 }

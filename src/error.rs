@@ -1,6 +1,7 @@
 //! The one error of the crate: few kinds, each a sentence that says where, what was found, what was
 //! expected and what to try.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong, by who can mend it.
@@ -27,12 +28,12 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
     /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), advice(source))]
     Io {
         /// The file.
         path: PathBuf,
         /// The cause.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// There is no way between start and goal.
     #[error("{0}")]
@@ -40,6 +41,20 @@ pub enum Error {
     /// The work was cancelled through a [`CancelToken`](crate::CancelToken).
     #[error("cancelled; nothing was written")]
     Cancelled,
+}
+
+/// What went wrong with a file, and what to do where that is known.
+fn advice(source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::NotFound => {
+            "there is no such file; check its name and the folder you are in".into()
+        }
+        io::ErrorKind::IsADirectory => "is a folder; name a file".into(),
+        io::ErrorKind::PermissionDenied => {
+            "permission denied; check who may read and write it".into()
+        }
+        _ => source.to_string(),
+    }
 }
 
 /// `Result` with the crate's [`Error`].
@@ -62,7 +77,7 @@ impl Error {
     }
 
     /// A [`Error::Io`] for `path`.
-    pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
+    pub fn io(path: impl AsRef<Path>, source: io::Error) -> Self {
         Self::Io { path: path.as_ref().to_path_buf(), source }
     }
 }

@@ -353,7 +353,11 @@ fn a_reader_that_leaves_is_no_error() {
 #[test]
 fn bad_input_is_named() {
     let folder = Folder::new();
-    folder.bad("info missing.tif", 3, "missing.tif: No such file or directory (os error 2)");
+    folder.bad(
+        "info missing.tif",
+        3,
+        "missing.tif: there is no such file; check its name and the folder you are in",
+    );
     folder.write("notes.txt", "hello\n");
     folder.bad(
         "info notes.txt",
@@ -659,7 +663,7 @@ const SHEET: &str = r#"{"degree":[2,1],"knots":[[0,0,0,1,1,1],[0,0,1,1]],
 fn match_compares_terrain_and_surfaces_on_any_metric() {
     let folder = Folder::new();
     folder.write("sheet.json", SHEET);
-    for metric in ["curvature", "difference", "isotropic"] {
+    for metric in ["curvature", "difference", "difference-literal", "isotropic"] {
         let line = format!("match range.tif sheet.json --nodes 30x20 --metric {metric} --json -q");
         let json: Value = serde_json::from_str(&folder.good(&line)).unwrap();
         let counts = [0, 1].map(|i| json["surfaces"][i]["regions"].as_array().unwrap().len());
@@ -680,12 +684,13 @@ fn match_compares_terrain_and_surfaces_on_any_metric() {
 #[test]
 fn match_refuses_what_it_cannot_compare() {
     let folder = Folder::new();
-    folder.bad(
-        "match range.tif --metric tensor",
-        2,
-        "match needs a metric that knows nothing of the grid: curvature, difference or isotropic",
-    );
+    folder.bad("match range.tif --metric tensor", 2, "the metric `tensor` needs --tensor FILE.tif");
     folder.write("sheet.json", SHEET);
+    folder.bad(
+        "match range.tif sheet.json --max-slope 30",
+        2,
+        "--max-slope is for DEMs, and sheet.json is none",
+    );
     folder.bad(
         "match sheet.json --nodes 1x20",
         2,
@@ -696,4 +701,144 @@ fn match_refuses_what_it_cannot_compare() {
     folder.good("match plain.tif -o like -q");
     let again = folder.run("match plain.tif -o like");
     assert!(again.code == 2 && again.err.contains("matches.json"), "{again:?}");
+}
+
+#[test]
+fn match_cuts_as_segment_does() {
+    let folder = Folder::new();
+    folder.write("sheet.json", SHEET);
+    for flags in [
+        "--epsilon 20,5 --delta 0.002",
+        "--levels 2 --merge 0.2",
+        "--metric difference --difference-delta auto:0.5 --accuracy high",
+        "--max-slope 40 --climb-weight 0.1 --barrier wall.geojson",
+    ] {
+        let regions = |line: String| -> Vec<Value> {
+            let json: Value = serde_json::from_str(&folder.good(&line)).unwrap();
+            let all = json.pointer("/surfaces/0/regions").unwrap_or(&json["regions"]);
+            all.as_array().unwrap().clone()
+        };
+        let mut cut = regions(format!("segment range.tif --json -q {flags}"));
+        let finest = cut.iter().filter_map(|region| region["level"].as_u64()).max();
+        cut.retain(|region| region["level"].as_u64() == finest);
+        let matched = regions(format!("match range.tif --json -q {flags}"));
+        assert_eq!(matched.len(), cut.len(), "{flags}");
+        for (one, other) in matched.iter().zip(&cut) {
+            assert_eq!(one["seed"], other["seed"], "{flags}");
+            assert_eq!(one["signature"], other["signature"], "{flags}");
+        }
+    }
+    let cut = folder.good("match sheet.json --nodes 30x20 --epsilon 0.5 --merge 0.1 --delta 0.3");
+    assert!(cut.contains("best of all"), "{cut}");
+}
+
+#[test]
+fn every_command_names_the_file_it_cannot_read() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("folder")).unwrap();
+    for name in ["empty.tif", "empty.json", "empty.geojson"] {
+        folder.write(name, "");
+    }
+    let places = "--start pixel:3,3 --goal pixel:50,30";
+    let commands = |dem: &str| {
+        [
+            format!("info {dem}"),
+            format!("surface {dem}"),
+            format!("distance {dem} --start pixel:3,3"),
+            format!("route {dem} {places}"),
+            format!("compare {dem} {places}"),
+            format!("segment {dem}"),
+            format!("match {dem}"),
+            format!("match range.tif {dem}"),
+            format!("render {dem} -o x.png"),
+            format!("route range.tif {places} --cost {dem}"),
+            format!("route range.tif {places} --tensor {dem}"),
+        ]
+    };
+    for (file, code, said) in [
+        ("missing.tif", 3, "there is no such file; check its name and the folder you are in"),
+        ("folder", 3, "is a folder; name a file"),
+        ("empty.tif", 2, "the file is empty"),
+    ] {
+        for line in commands(file) {
+            folder.bad(&line, code, &format!("{file}: {said}"));
+        }
+    }
+    folder.bad("match empty.json", 2, "empty.json: the file is empty");
+    folder.bad(
+        &format!("route range.tif {places} --barrier empty.geojson"),
+        2,
+        "empty.geojson: the file is empty",
+    );
+}
+
+#[test]
+fn terrains_of_a_few_cells_are_cut_and_matched() {
+    let folder = Folder::new();
+    for (name, cols, rows, heights) in [
+        ("row", 7, 1, "1 2 3 5 3 2 1"),
+        ("column", 1, 7, "1 2 3 5 3 2 1"),
+        ("pair", 2, 1, "5 6"),
+        ("cell", 1, 1, "5"),
+        ("island", 3, 3, "-9 -9 -9 -9 7 -9 -9 -9 -9"),
+    ] {
+        folder.write(
+            &format!("{name}.asc"),
+            &format!(
+                "ncols {cols}\nnrows {rows}\nxllcorner 0\nyllcorner 0\ncellsize 10\n\
+                 NODATA_value -9\n{heights}\n"
+            ),
+        );
+        for flags in ["", "--metric difference --levels 3", "--epsilon 1e-9 --merge 0.2"] {
+            folder.good(&format!("segment {name}.asc -q --overwrite -o x.png {flags}"));
+            folder.good(&format!("match {name}.asc range.tif -q {flags}"));
+        }
+        folder.good(&format!("match {name}.asc -q -o {name} --epsilon 1e-9"));
+    }
+    let alone = folder.good("match cell.asc");
+    assert!(alone.contains("cell.asc: 1 region\none region alone matches none"), "{alone}");
+    folder.write(
+        "void.asc",
+        "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n-9 -9\n",
+    );
+    let empty = folder.run("match range.tif void.asc");
+    let said = "error: void.asc: all heights are void; there is no surface to fit\n";
+    assert!(empty.code == 2 && empty.err.ends_with(said), "{empty:?}");
+}
+
+#[test]
+fn bad_radii_levels_and_surfaces_are_refused() {
+    let folder = Folder::new();
+    for command in ["segment", "match"] {
+        for radius in ["0", "-1", "NaN", "inf", "5,0"] {
+            let bad = folder.run(&format!("{command} range.tif --epsilon {radius}"));
+            assert!(bad.code == 2 && bad.err.contains("expected a number above 0"), "{bad:?}");
+        }
+        for levels in ["0", "50"] {
+            let bad = folder.run(&format!("{command} range.tif --levels {levels}"));
+            assert!(bad.code == 2 && bad.err.contains("is not in 1..=8"), "{bad:?}");
+        }
+    }
+    folder.write("large.json", &SHEET.replace("[2,0,3,1]", "[2e300,0,3,1]"));
+    folder.bad(
+        "match large.json",
+        2,
+        "large.json: control point 1 is at [2e300, 0.0, 3.0] with weight 1.0; it must be finite and at \
+         most 1e14 m from the origin",
+    );
+    folder.write("heavy.json", &SHEET.replace("[2,0,3,1]", "[2,0,3,1e300]"));
+    folder.bad(
+        "match heavy.json",
+        2,
+        "heavy.json: the weight of control point 1 is 1e300; it must be between 1e-9 and 1e9",
+    );
+    folder.write("list.json", "[]");
+    folder.bad(
+        "match list.json",
+        2,
+        "list.json: not a surface in JSON: invalid length 0, expected an object with degree, knots \
+         and points at line 1 column 2",
+    );
+    let many = folder.run("match range.tif --nodes 99999x99999");
+    assert!(many.code == 2 && many.err.contains("at most 268435456 cells"), "{many:?}");
 }

@@ -2,11 +2,11 @@
 //!
 //! The surface is level in the west and wavy in the east. At the same radius, a cluster of level ground is much larger.
 //!
-//! `cargo run --release --example figure_3 [folder]` writes `distance.png` (figure 2) and `clusters.png` (figure 3) there.
+//! `cargo run --release --example figure_3 [FOLDER]` draws both into FOLDER or `target/figures`.
 
+#[path = "../figures/output.rs"]
+mod output;
 mod waves;
-
-use std::path::Path;
 
 use glam::DVec2;
 use ridgeway::region::{
@@ -38,19 +38,14 @@ fn main() -> Result<(), Error> {
     let (least, most) =
         areas.fold((f64::INFINITY, 0.0), |(a, b), x| (f64::min(a, x), f64::max(b, x)));
     println!("area of the smallest and the largest m2, {least:.0}, {most:.0}");
-    let Some(folder) = std::env::args().nth(1) else { return Ok(()) };
-    let save = |name: &str, picture: Vec<u8>| {
-        let path = Path::new(&folder).join(name);
-        std::fs::write(&path, picture).map_err(|source| Error::io(&path, source))
-    };
     let start = DVec2::splat(middle as f64).into();
     let map = Solver::default().solve_field(field, &[start], &Stop::Never, &control)?;
     let distance = map.to_row_major();
     let mut picture =
         FieldPicture::new(terrain.frame(), &distance, Gradient::Sequential, "distance (AG units)");
     picture.title = "Distance from the middle under the curvature tensor".into();
-    save("distance.png", picture.png()?)?;
-    save("clusters.png", clusters(&terrain, &cut)?)
+    output::save("figure-2.png", &picture.png()?)?;
+    output::save("figure-3.png", &clusters(&terrain, &cut)?)
 }
 
 fn clusters(terrain: &Terrain, cut: &Segmentation) -> Result<Vec<u8>, Error> {

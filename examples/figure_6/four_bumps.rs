@@ -15,6 +15,20 @@ pub(crate) fn terrain() -> Result<Terrain, Error> {
     Synthetic::new(SyntheticKind::FourBumps, SIDE, SIDE, 10.0)?.terrain(Crs::none(), DVec2::ZERO)
 }
 
+/// Four overlapping Gaussian bumps in the same places, their standard deviation as a share of the distance between neighbours.
+pub(crate) fn gaussians(deviation: f64) -> Result<Terrain, Error> {
+    let frame = terrain()?.frame().clone();
+    let quarter = 0.25 * SIDE as f64;
+    let bump = |i: usize, (x, y): (f64, f64)| {
+        let node = DVec2::new((i % SIDE) as f64, (i / SIDE) as f64);
+        let off = node - (DVec2::new(x, y) * quarter - 0.5);
+        (-0.5 * off.length_squared() / (2.0 * quarter * deviation).powi(2)).exp()
+    };
+    let tops = [(1.0, 1.0), (3.0, 1.0), (1.0, 3.0), (3.0, 3.0)];
+    let height = |i| 200.0 * tops.iter().map(|&top| bump(i, top)).sum::<f64>();
+    Terrain::new(frame, (0..SIDE * SIDE).map(height).collect(), Crs::none())
+}
+
 pub(crate) fn surface(terrain: &Terrain) -> Result<HeightSurface, Error> {
     let options = FitOptions { smoothing: Smoothing::Interpolate, ..FitOptions::default() };
     HeightSurface::fit(terrain, &options, &Control::default())

@@ -1,11 +1,13 @@
 //! The command line as the user writes it: flags, their help and their parsers. No file is touched here.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec2;
 use ridgeway::metric::{Difference, DifferenceForm};
-use ridgeway::{Accuracy, Degree, Delta, FitOptions, Metric, Smoothing, Solver};
+use ridgeway::region::SegmentOptions;
+use ridgeway::{Accuracy, Degree, Delta, Error, FitOptions, Metric, Smoothing, Solver, Sym2};
 
 use crate::places::Place;
 
@@ -278,16 +280,8 @@ pub(crate) struct SegmentArgs {
     /// Replace files that exist.
     #[arg(long)]
     pub(crate) overwrite: bool,
-    /// Radius of the clusters in the unit of the metric; several, falling, for as many levels [default: half of the largest
-    /// distance from the first seed, in each region anew].
-    #[arg(long, value_name = "VALUE", value_delimiter = ',', value_parser = positive, allow_hyphen_values = true)]
-    pub(crate) epsilon: Vec<f64>,
-    /// How often to cut: the terrain, then its regions, then theirs [default: 1, or one for each --epsilon].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
-    pub(crate) levels: Option<u8>,
-    /// Join neighbours on the last level whose signatures differ by at most this much, between 0 (none) and 1 (all).
-    #[arg(long, value_name = "TOLERANCE", value_parser = share, allow_hyphen_values = true)]
-    pub(crate) merge: Option<f64>,
+    #[command(flatten)]
+    pub(crate) regions: RegionArgs,
     #[command(flatten)]
     pub(crate) ground: GroundArgs,
 }
@@ -305,12 +299,9 @@ pub(crate) struct MatchArgs {
     /// One or two surfaces: DEMs, or NURBS surfaces in .json files.
     #[arg(required = true, num_args = 1..=2, value_name = "SURFACE")]
     pub(crate) surfaces: Vec<PathBuf>,
-    /// The metric of the regions.
-    #[arg(long, value_enum, value_name = "METRIC", default_value_t = MetricName::Curvature)]
-    pub(crate) metric: MetricName,
-    /// How often to cut, see `segment`.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=8))]
-    pub(crate) levels: u8,
+    /// The metric of the regions [default: curvature, or tensor with --tensor].
+    #[arg(long, value_enum, value_name = "METRIC")]
+    pub(crate) metric: Option<MetricName>,
     /// Let sizes count beside shapes.
     #[arg(long)]
     pub(crate) sized: bool,
@@ -324,7 +315,9 @@ pub(crate) struct MatchArgs {
     #[arg(long)]
     pub(crate) overwrite: bool,
     #[command(flatten)]
-    pub(crate) fit: FitArgs,
+    pub(crate) regions: RegionArgs,
+    #[command(flatten)]
+    pub(crate) ground: GroundArgs,
 }
 
 #[derive(Debug, Args)]
@@ -376,6 +369,32 @@ pub(crate) struct GroundArgs {
     pub(crate) fit: FitArgs,
     #[command(flatten)]
     pub(crate) metric: MetricArgs,
+}
+
+/// How to cut a surface into regions.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Regions")]
+pub(crate) struct RegionArgs {
+    /// Radius of the clusters in the unit of the metric; several, falling, for as many levels [default: half of the largest
+    /// distance from the first seed, in each region anew].
+    #[arg(long, value_name = "VALUE", value_delimiter = ',', value_parser = positive, allow_hyphen_values = true)]
+    pub(crate) epsilon: Vec<f64>,
+    /// How often to cut: the surface, then its regions, then theirs [default: 1, or one for each --epsilon].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub(crate) levels: Option<u8>,
+    /// Join neighbours on the last level whose signatures differ by at most this much, between 0 (none) and 1 (all).
+    #[arg(long, value_name = "TOLERANCE", value_parser = share, allow_hyphen_values = true)]
+    pub(crate) merge: Option<f64>,
+}
+
+impl RegionArgs {
+    pub(crate) fn options(&self, solver: Solver) -> SegmentOptions {
+        SegmentOptions {
+            levels: self.levels.map_or(self.epsilon.len().max(1), usize::from),
+            epsilons: self.epsilon.clone(),
+            solver,
+        }
+    }
 }
 
 /// What surface to fit.
@@ -467,17 +486,45 @@ impl MetricArgs {
         Solver { accuracy, ..Solver::default() }
     }
 
-    pub(crate) fn curvature(&self) -> Metric {
-        Metric::Curvature(self.delta.unwrap_or_default())
+    /// The metric of this name, with the user's tensors if there are any.
+    ///
+    /// # Errors
+    /// `tensor` without tensors.
+    pub(crate) fn metric(
+        &self,
+        name: MetricName,
+        tensors: Option<&Arc<[Sym2]>>,
+    ) -> Result<Metric, Error> {
+        let difference = |form| {
+            let default = Difference::default();
+            Metric::Difference(Difference {
+                form,
+                curvature_delta: self.delta.unwrap_or(default.curvature_delta),
+                delta: self.difference_delta.unwrap_or(default.delta),
+            })
+        };
+        match (name, tensors) {
+            (MetricName::Isotropic, _) => Ok(Metric::Isotropic),
+            (MetricName::Curvature, _) => Ok(Metric::Curvature(self.delta.unwrap_or_default())),
+            (MetricName::Difference, _) => Ok(difference(DifferenceForm::Rate)),
+            (MetricName::DifferenceLiteral, _) => Ok(difference(DifferenceForm::Literal)),
+            (MetricName::Tensor, Some(tensors)) => Ok(Metric::Tensor(Arc::clone(tensors))),
+            (MetricName::Tensor, None) => {
+                Err(Error::usage("the metric `tensor` needs --tensor FILE.tif"))
+            }
+        }
     }
 
-    pub(crate) fn difference(&self, form: DifferenceForm) -> Difference {
-        let default = Difference::default();
-        Difference {
-            form,
-            curvature_delta: self.delta.unwrap_or(default.curvature_delta),
-            delta: self.difference_delta.unwrap_or(default.delta),
-        }
+    /// The first flag given that only a DEM can have.
+    pub(crate) fn of_dems(&self) -> Option<&'static str> {
+        let given = [
+            ("--climb-weight", self.climb_weight > 0.0),
+            ("--max-slope", self.max_slope.is_some()),
+            ("--barrier", !self.barrier.is_empty()),
+            ("--cost", self.cost.is_some()),
+            ("--tensor", self.tensor.is_some()),
+        ];
+        given.into_iter().find_map(|(flag, given)| given.then_some(flag))
     }
 }
 

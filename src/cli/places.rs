@@ -244,6 +244,9 @@ fn file_spot(option: &'static str, path: &Path, grid: DVec2, terrain: &Terrain) 
 /// The file cannot be read, is not GeoJSON, holds no geometry; the DEM has no CRS.
 pub(crate) fn read_shapes(path: &Path, terrain: &Terrain) -> Result<StartRegion> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+    if text.is_empty() {
+        return Err(Error::format(path, "the file is empty"));
+    }
     let json: GeoJson =
         text.parse().map_err(|error| Error::format(path, format!("is not GeoJSON: {error}")))?;
     let geometries: Vec<Geometry> = match json {

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use ridgeway::metric::DifferenceForm;
 use ridgeway::terrain::read_bands;
 use ridgeway::{
     Control, DistanceMap, Error, GridFrame, HeightSurface, Metric, MetricField, Modifiers, Result,
@@ -58,7 +57,12 @@ impl<'a> Journey<'a> {
             Some(path) => Some(costs(path, &terrain)?),
             None => None,
         };
-        let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
+        let surface = HeightSurface::fit(&terrain, &args.fit.options(), control).map_err(
+            |error| match error {
+                Error::Usage(message) => Error::format(dem, message),
+                error => error,
+            },
+        )?;
         let start_names = start.iter().map(Place::to_string).collect();
         Ok(Self {
             args,
@@ -87,32 +91,26 @@ impl<'a> Journey<'a> {
         if self.tensors.is_some() { MetricName::Tensor } else { MetricName::Curvature }
     }
 
+    /// The metric of this name.
+    ///
+    /// # Errors
+    /// `tensor` without `--tensor`.
+    pub(crate) fn metric(&self, name: MetricName) -> Result<Metric> {
+        self.args.metric.metric(name, self.tensors.as_ref())
+    }
+
     /// The metric of this name on the surface.
     ///
     /// # Errors
     /// `tensor` without `--tensor`; a start or goal where the metric lets nobody enter.
     pub(crate) fn field(&self, name: MetricName) -> Result<MetricField<'_>> {
-        let metric = match (name, &self.tensors) {
-            (MetricName::Isotropic, _) => Metric::Isotropic,
-            (MetricName::Curvature, _) => self.args.metric.curvature(),
-            (MetricName::Difference, _) => {
-                Metric::Difference(self.args.metric.difference(DifferenceForm::Rate))
-            }
-            (MetricName::DifferenceLiteral, _) => {
-                Metric::Difference(self.args.metric.difference(DifferenceForm::Literal))
-            }
-            (MetricName::Tensor, Some(tensors)) => Metric::Tensor(Arc::clone(tensors)),
-            (MetricName::Tensor, None) => {
-                return Err(Error::usage("the metric `tensor` needs --tensor FILE.tif"));
-            }
-        };
         let modifiers = Modifiers {
             climb_weight: self.args.metric.climb_weight,
             max_slope_deg: self.args.metric.max_slope,
             barrier: self.barrier.clone(),
             cost: self.cost.clone(),
         };
-        let field = metric.on(&self.surface, &modifiers)?;
+        let field = self.metric(name)?.on(&self.surface, &modifiers)?;
         for spot in self.starts.iter().chain(&self.goals) {
             let why = match (name, self.args.metric.max_slope) {
                 _ if self.cost.is_some() => {

@@ -101,6 +101,7 @@ impl<'a> MapPicture<'a> {
         self.draw_ground(&mut sheet);
         if let Some(regions) = &self.regions {
             regions.draw_borders(&mut sheet);
+            regions.draw_numbers(&mut sheet, |grid| self.node(grid));
         }
         let mut labels = Vec::new();
         for layer in &self.isolines {
@@ -149,12 +150,17 @@ impl<'a> MapPicture<'a> {
         items
     }
 
+    /// The node nearest to grid coordinates.
+    fn node(&self, grid: DVec2) -> usize {
+        let node = self.frame.clamp(grid).round();
+        self.frame.index(node.x as usize, node.y as usize)
+    }
+
     fn draw_ground(&self, sheet: &mut Sheet) {
         let relief = Relief::new(self.frame, self.heights, self.max_side_px as usize);
         sheet.ground(|grid| {
             let colour = relief.at(grid)?;
-            let node = self.frame.clamp(grid).round();
-            let node = self.frame.index(node.x as usize, node.y as usize);
+            let node = self.node(grid);
             let barrier = self.barriers.get(node);
             let region = self.regions.as_ref().and_then(|regions| regions.colour(node));
             let colour = region.map_or(colour, |region| colour.mix(region, 0.5));

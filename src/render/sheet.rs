@@ -1,6 +1,7 @@
 //! The page of a picture: title above, map, and a footer of scale bar, north arrow and legend.
 
 use glam::{DVec2, Vec2};
+use rayon::prelude::*;
 use tiny_skia::Pixmap;
 
 use super::canvas::{Canvas, Rgb};
@@ -113,9 +114,19 @@ impl Sheet {
         let cells = self.cells;
         let period = (12.0 * self.unit) as usize;
         self.canvas.paint(self.map, |x, y| {
-            let grid = (DVec2::new(x as f64, y as f64) + 0.5) * cells - 0.5;
-            colour(grid).unwrap_or_else(|| hatching(x + y, period))
+            colour(on_grid(x, y, cells)).unwrap_or_else(|| hatching(x + y, period))
         });
+    }
+
+    /// Corner and size of the map in pixels, and for each of its pixels `value` at grid coordinates, row-major.
+    pub(super) fn sample<T: Send>(
+        &self,
+        value: impl Fn(DVec2) -> T + Sync,
+    ) -> ([usize; 4], Vec<T>) {
+        let [_, _, width, height] = self.map;
+        let pixels = (0..width * height).into_par_iter();
+        let values = pixels.map(|i| value(on_grid(i % width, i / width, self.cells)));
+        (self.map, values.collect())
     }
 
     /// Pixel coordinates of grid coordinates.
@@ -150,6 +161,11 @@ impl Sheet {
         self.canvas.lines(&[corners.to_vec()], self.unit, Rgb(0x77, 0x77, 0x77), 1.0);
         self.canvas.into_pixmap()
     }
+}
+
+/// Grid coordinates of a pixel of the map.
+fn on_grid(x: usize, y: usize, cells: DVec2) -> DVec2 {
+    (DVec2::new(x as f64, y as f64) + 0.5) * cells - 0.5
 }
 
 /// Diagonal hatching along the diagonals `x + y`.

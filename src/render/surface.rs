@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use tiny_skia::{Pixmap, PixmapPaint, Transform};
 
 use super::canvas::{self, Canvas, Rgb};
+use super::regions::draw_numbers;
 use super::sheet::{SIDE, SIDES};
 use super::text;
 use crate::{Error, ParametricSurface, Result};
@@ -30,6 +31,9 @@ pub struct SurfacePicture<'a> {
     /// Whether colours go over into each other between nodes, as those of a field, or each node has its own place, as
     /// labels do. Default: true.
     pub blend: bool,
+    /// Region of each node, row-major, whose numbers, counted from 1, are written where they are seen and have room; empty for none.
+    /// Default: none.
+    pub regions: &'a [Option<u32>],
     /// Lines in grid coordinates on the surface, such as routes and isolines. Default: none.
     pub lines: Vec<(Vec<DVec2>, Rgb)>,
     /// Points in grid coordinates, such as seeds. Default: none.
@@ -50,6 +54,7 @@ impl<'a> SurfacePicture<'a> {
             surface,
             colours,
             blend: true,
+            regions: &[],
             lines: Vec::new(),
             points: Vec::new(),
             view: DVec3::new(1.0, -2.0, 1.0),
@@ -61,7 +66,7 @@ impl<'a> SurfacePicture<'a> {
     /// Draws the picture.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there is not one colour per node, the size is out of bounds, the view has no direction, or there is
+    /// [`Error::Usage`] if there is not one colour, or region, per node, the size is out of bounds, the view has no direction, or there is
     /// nothing to see.
     pub fn render(&self) -> Result<Pixmap> {
         let (cols, rows) = (self.surface.cols(), self.surface.rows());
@@ -76,6 +81,10 @@ impl<'a> SurfacePicture<'a> {
                 "a picture of {} pixels is asked for",
                 self.max_side_px
             )));
+        }
+        if ![0, cols * rows].contains(&self.regions.len()) {
+            let found = self.regions.len();
+            return Err(Error::usage(format!("{found} regions for {cols} × {rows} nodes")));
         }
         let camera = Camera::new(self.view)?;
         let nodes: Vec<Option<Vertex>> =
@@ -125,6 +134,7 @@ impl<'a> SurfacePicture<'a> {
                 at: camera.place(jet.point),
                 light: camera.light(jet.normal()),
                 colour: self.colours[row * self.surface.cols() + col],
+                region: self.regions.get(row * self.surface.cols() + col).copied().flatten(),
             })
         })
         .collect()
@@ -193,6 +203,7 @@ struct Vertex {
     at: DVec3,
     light: f64,
     colour: Rgb,
+    region: Option<u32>,
 }
 
 /// Samples of the picture, each with the depth of what was nearest so far.
@@ -201,6 +212,8 @@ struct Film {
     height: usize,
     colours: Vec<Rgb>,
     depths: Vec<f64>,
+    /// What region is seen; none on lines and points.
+    regions: Vec<Option<u32>>,
     /// Samples per metre, and the place of sample 0, 0.
     scale: f64,
     origin: DVec2,
@@ -228,6 +241,7 @@ impl Film {
             height,
             colours: vec![Rgb::WHITE; width * height],
             depths: vec![f64::NEG_INFINITY; width * height],
+            regions: vec![None; width * height],
             scale,
             origin: least.truncate() - margin,
             size,
@@ -240,13 +254,13 @@ impl Film {
     }
 
     /// The sample at a place, if what is `depth` near there is nearest so far.
-    fn nearest(&mut self, x: usize, y: usize, depth: f64) -> Option<&mut Rgb> {
+    fn nearest(&mut self, x: usize, y: usize, depth: f64) -> Option<usize> {
         let i = y * self.width + x;
         if x >= self.width || y >= self.height || depth <= self.depths[i] {
             return None;
         }
         self.depths[i] = depth;
-        Some(&mut self.colours[i])
+        Some(i)
     }
 
     fn triangle(&mut self, corners: [Vertex; 3], blend: bool) {
@@ -270,16 +284,17 @@ impl Film {
                 };
                 let depth = mean(&|corner| corner.at.z);
                 let Some(sample) = self.nearest(x, y, depth) else { continue };
+                let nearest =
+                    (1..3).fold(0, |best, i| if shares[i] > shares[best] { i } else { best });
                 let colour = if blend {
                     let channel =
                         |of: fn(Rgb) -> u8| mean(&|corner| of(corner.colour).into()).round() as u8;
                     Rgb(channel(|c| c.0), channel(|c| c.1), channel(|c| c.2))
                 } else {
-                    let nearest =
-                        (1..3).fold(0, |best, i| if shares[i] > shares[best] { i } else { best });
                     corners[nearest].colour
                 };
-                *sample = Rgb(0, 0, 0).mix(colour, mean(&|corner| corner.light));
+                self.colours[sample] = Rgb(0, 0, 0).mix(colour, mean(&|corner| corner.light));
+                self.regions[sample] = corners[nearest].region;
             }
         }
     }
@@ -304,7 +319,8 @@ impl Film {
                 if centre.distance(DVec2::new(x as f64, y as f64)) <= radius
                     && let Some(sample) = self.nearest(x, y, depth)
                 {
-                    *sample = colour;
+                    self.colours[sample] = colour;
+                    self.regions[sample] = None;
                 }
             }
         }
@@ -327,6 +343,10 @@ impl Film {
             let [r, g, b] = sums.map(|sum| (sum / (SAMPLES * SAMPLES) as u32) as u8);
             Rgb(r, g, b)
         });
+        let pixels: Vec<_> = (0..width * height)
+            .map(|i| self.regions[i / width * SAMPLES * self.width + i % width * SAMPLES])
+            .collect();
+        draw_numbers(&mut canvas, &pixels, [0, head, width], text_size);
         let title = text::fitted(title, text_size, 0.94 * width as f32);
         canvas.text(
             &title,

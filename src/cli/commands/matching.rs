@@ -4,23 +4,23 @@ use std::fs;
 use std::path::Path;
 
 use glam::DVec2;
+use ridgeway::eikonal::TensorField;
 use ridgeway::export::write_folder;
-use ridgeway::metric::Difference;
 use ridgeway::region::{
-    Level, Match, Neighbours, SegmentOptions, Segmentation, Signature, difference_ranks,
-    gaussian_ranks, matches, matches_within, outlines, signatures,
+    Level, Match, Neighbours, Signature, matches, matches_within, outlines, signatures,
 };
 use ridgeway::render::{
     LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, pair_colour, png,
 };
 use ridgeway::surface::{NurbsGrid, NurbsSurface};
-use ridgeway::{Control, Delta, Error, HeightSurface, Metric, ParametricSurface, Result, Terrain};
+use ridgeway::{Control, Error, ParametricSurface, Result};
 use serde_json::{Value, json};
 
 use super::render::title;
+use super::segment::cut;
 use crate::args::{MatchArgs, MetricName, RunArgs};
 use crate::output::check_outputs_in;
-use crate::plan::{self, command_line};
+use crate::plan::{Journey, command_line};
 use crate::report::{Report, Table, digits, metres};
 
 const FILES: [&str; 3] = ["matches.json", "regions.png", "signatures.png"];
@@ -71,50 +71,50 @@ pub(super) fn run(args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<
 /// A surface cut into regions.
 struct Subject<'a> {
     path: &'a Path,
-    ground: Ground,
+    ground: Ground<'a>,
     /// The finest level.
     level: Level,
     signatures: Vec<Signature>,
 }
 
-enum Ground {
-    Heights(Box<(Terrain, HeightSurface)>),
-    Nurbs(NurbsGrid),
+enum Ground<'a> {
+    Heights(Box<Journey<'a>>),
+    Nurbs(Box<NurbsGrid>),
 }
 
 impl<'a> Subject<'a> {
     /// Reads a surface and cuts it.
     ///
     /// # Errors
-    /// A file that cannot be read or used.
-    fn open(path: &'a Path, args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<Self> {
+    /// A file that cannot be read or used; a flag that a NURBS surface cannot have.
+    fn open(
+        path: &'a Path,
+        args: &'a MatchArgs,
+        run: &RunArgs,
+        control: &'a Control,
+    ) -> Result<Self> {
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let ground = if is_json {
+        let (ground, metric, field) = if is_json {
+            if let Some(flag) = args.ground.metric.of_dems() {
+                let name = path.display();
+                return Err(Error::usage(format!("{flag} is for DEMs, and {name} is none")));
+            }
             let (cols, rows) = args.nodes;
-            Ground::Nurbs(NurbsSurface::open(path)?.on_grid(cols, rows)?)
+            let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
+            let metric =
+                args.ground.metric.metric(args.metric.unwrap_or(MetricName::Curvature), None)?;
+            let field = metric.on_surface(&surface)?.sample(control)?;
+            (Ground::Nurbs(Box::new(surface)), metric, field)
         } else {
-            let terrain = plan::open(path, run)?;
-            let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
-            Ground::Heights(Box::new((terrain, surface)))
+            let journey = Journey::prepare(path, (&[], &[]), &args.ground, run, control)?;
+            let name = args.metric.unwrap_or(journey.default_metric());
+            let field = TensorField::sample(&journey.field(name)?, control)?;
+            let metric = journey.metric(name)?;
+            (Ground::Heights(Box::new(journey)), metric, field)
         };
         let surface = ground.surface();
-        let metric = match args.metric {
-            MetricName::Isotropic => Metric::Isotropic,
-            MetricName::Curvature => Metric::Curvature(Delta::default()),
-            MetricName::Difference => Metric::Difference(Difference::default()),
-            MetricName::DifferenceLiteral | MetricName::Tensor => {
-                return Err(Error::usage(
-                    "match needs a metric that knows nothing of the grid: curvature, difference or isotropic",
-                ));
-            }
-        };
-        let ranks = match args.metric {
-            MetricName::Difference => difference_ranks(surface, &Difference::default(), control)?,
-            _ => gaussian_ranks(surface),
-        };
-        let field = metric.on_surface(surface)?.sample(control)?;
-        let options = SegmentOptions { levels: args.levels.into(), ..SegmentOptions::default() };
-        let mut levels = Segmentation::of(&field, &ranks, &options, control)?.levels;
+        let (regions, solver) = (&args.regions, args.ground.metric.solver());
+        let mut levels = cut(surface, field, &metric, regions, solver, control)?.levels;
         let level = levels.pop().unwrap_or_default();
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
         Ok(Self { path, ground, level, signatures })
@@ -125,17 +125,17 @@ impl<'a> Subject<'a> {
         let [col, row] = self.level.regions[region].seed;
         let node = DVec2::new(col as f64, row as f64);
         match &self.ground {
-            Ground::Heights(ground) => ground.0.frame().to_map(node).to_array().into(),
+            Ground::Heights(journey) => journey.terrain.frame().to_map(node).to_array().into(),
             Ground::Nurbs(surface) => surface.space_jet(node).point.to_array().into(),
         }
     }
 }
 
-impl Ground {
+impl Ground<'_> {
     fn surface(&self) -> &dyn ParametricSurface {
         match self {
-            Self::Heights(ground) => &ground.1,
-            Self::Nurbs(surface) => surface,
+            Self::Heights(journey) => &journey.surface,
+            Self::Nurbs(surface) => &**surface,
         }
     }
 }
@@ -159,8 +159,8 @@ fn colours(subjects: &[Subject<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
 /// The surfaces side by side.
 fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
     let picture = |(subject, colours): (&Subject<'_>, &Vec<Rgb>)| match &subject.ground {
-        Ground::Heights(ground) => {
-            let terrain = &ground.0;
+        Ground::Heights(journey) => {
+            let terrain = &journey.terrain;
             let outlines = outlines(&subject.level, terrain.frame().cols());
             let mut map = MapPicture::new(terrain.frame(), terrain.heights());
             (map.title, map.max_side_px) = (title(subject.path), PIXELS);
@@ -176,9 +176,9 @@ fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
             let labels = subject.level.labels.iter();
             let colours: Vec<_> =
                 labels.map(|l| l.map_or(Rgb::WHITE, |l| colours[l as usize])).collect();
-            let mut picture = SurfacePicture::new(surface, &colours);
+            let mut picture = SurfacePicture::new(&**surface, &colours);
             (picture.title, picture.max_side_px) = (title(subject.path), PIXELS);
-            picture.blend = false;
+            (picture.blend, picture.regions) = (false, &subject.level.labels);
             picture.render()
         }
     };
@@ -206,7 +206,12 @@ fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
 fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
     let mut text = String::new();
     for subject in subjects {
-        text += &format!("{}: {} regions\n", title(subject.path), subject.signatures.len());
+        let count = subject.signatures.len();
+        let noun = if count == 1 { "region" } else { "regions" };
+        text += &format!("{}: {count} {noun}\n", title(subject.path));
+    }
+    if found.is_empty() {
+        return text + "one region alone matches none; cut finer by --epsilon or --levels\n";
     }
     let mut table = Table::default();
     let header = ["", "first", "second", "unlike", "size", "size", "ratio", "best of all"];

@@ -2,17 +2,16 @@
 
 use ridgeway::eikonal::TensorField;
 use ridgeway::export::{Samples, regions_geojson};
-use ridgeway::metric::DifferenceForm;
 use ridgeway::region::{
-    Level, Neighbours, Polygon, RegionStatistics, SegmentOptions, Segmentation, Signature,
-    difference_ranks, gaussian_ranks, outlines, signatures, statistics,
+    Level, Neighbours, Polygon, RegionStatistics, Segmentation, Signature, difference_ranks,
+    gaussian_ranks, outlines, signatures, statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
-use ridgeway::{Control, HeightSurface, MetricField, Result};
+use ridgeway::{Control, HeightSurface, Metric, MetricField, ParametricSurface, Result, Solver};
 use serde_json::{Map, Value, json};
 
 use super::render::title;
-use crate::args::{MetricName, RunArgs, SegmentArgs};
+use crate::args::{RegionArgs, RunArgs, SegmentArgs};
 use crate::output::{check_distinct, check_file, write_content, write_raster};
 use crate::plan::Journey;
 use crate::report::{Facts, Report, Table, coordinate, digits, distance, wrote};
@@ -29,11 +28,6 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         .iter()
         .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
         .collect::<Result<Vec<_>>>()?;
-    let options = SegmentOptions {
-        levels: args.levels.map_or(args.epsilon.len().max(1), usize::from),
-        epsilons: args.epsilon.clone(),
-        solver: args.ground.metric.solver(),
-    };
     let mut journey = Journey::prepare(&args.dem, (&[], &[]), &args.ground, run, control)?;
     if !formats.iter().any(|format| format == "png") {
         journey = journey.without_heights();
@@ -41,12 +35,9 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     let name = args.metric.unwrap_or(journey.default_metric());
     let metric = journey.field(name)?;
     let field = TensorField::sample(&metric, control)?;
-    let ranks = ranks(name, args, &journey.surface, control)?;
-    let mut segmentation = Segmentation::of(&field, &ranks, &options, control)?;
-    drop((field, ranks));
-    if let Some(tolerance) = args.merge {
-        segmentation.merge_alike(&journey.surface, tolerance, control)?;
-    }
+    let kind = journey.metric(name)?;
+    let (regions, solver) = (&args.regions, args.ground.metric.solver());
+    let segmentation = cut(&journey.surface, field, &kind, regions, solver, control)?;
     let measures = measures(&segmentation, &journey.surface, control)?;
     let outcome = Outcome { journey: &journey, metric: &metric, segmentation, measures };
     control.check()?;
@@ -71,19 +62,28 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     Report { text: outcome.text() + &written, json }.print(run)
 }
 
-/// The order in which nodes become seeds.
-fn ranks(
-    name: MetricName,
-    args: &SegmentArgs,
-    surface: &HeightSurface,
+/// Cuts a surface, on which `field` is the metric, as the flags ask.
+///
+/// # Errors
+/// Radii that do not fall; too many or no regions; cancelled.
+pub(super) fn cut(
+    surface: &dyn ParametricSurface,
+    field: TensorField,
+    metric: &Metric,
+    regions: &RegionArgs,
+    solver: Solver,
     control: &Control,
-) -> Result<Vec<f64>> {
-    let form = match name {
-        MetricName::Difference => DifferenceForm::Rate,
-        MetricName::DifferenceLiteral => DifferenceForm::Literal,
-        _ => return Ok(gaussian_ranks(surface)),
+) -> Result<Segmentation> {
+    let ranks = match metric {
+        Metric::Difference(difference) => difference_ranks(surface, difference, control)?,
+        _ => gaussian_ranks(surface),
     };
-    difference_ranks(surface, &args.ground.metric.difference(form), control)
+    let mut segmentation = Segmentation::of(&field, &ranks, &regions.options(solver), control)?;
+    drop((field, ranks));
+    if let Some(tolerance) = regions.merge {
+        segmentation.merge_alike(surface, tolerance, control)?;
+    }
+    Ok(segmentation)
 }
 
 /// Statistics and signature of each region of each level.

@@ -15,7 +15,7 @@ const LONGEST: u64 = 1 << 28;
 
 /// The JSON form.
 #[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with degree, knots and points")]
 struct Schema {
     degree: [usize; 2],
     #[serde(default)]
@@ -77,6 +77,9 @@ impl NurbsSurface {
                 path,
                 format!("longer than {LONGEST} bytes, which no surface is"),
             ));
+        }
+        if text.is_empty() {
+            return Err(Error::format(path, "the file is empty"));
         }
         Self::parse(&text).map_err(|e| Error::format(path, e.to_string()))
     }

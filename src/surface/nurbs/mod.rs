@@ -273,8 +273,8 @@ fn homogeneous(points: &[DVec4]) -> Result<Vec<DVec4>> {
     let fits = |p: &DVec4| p.xyz().abs().max_element() <= FARTHEST && p.is_finite();
     if let Some(i) = points.iter().position(|p| !fits(p)) {
         return Err(Error::usage(format!(
-            "control point {i} is at {} with weight {}; it must be finite and at most {FARTHEST:e} m from the origin",
-            points[i].xyz(),
+            "control point {i} is at {:?} with weight {:?}; it must be finite and at most {FARTHEST:e} m from the origin",
+            points[i].xyz().to_array(),
             points[i].w
         )));
     }
@@ -287,7 +287,7 @@ fn homogeneous(points: &[DVec4]) -> Result<Vec<DVec4>> {
 fn check_weights(net: &[DVec4]) -> Result<()> {
     match net.iter().position(|p| !(LIGHTEST..=LIGHTEST.recip()).contains(&p.w)) {
         Some(i) => Err(Error::usage(format!(
-            "the weight of control point {i} is {}; it must be between {LIGHTEST:e} and {:e}",
+            "the weight of control point {i} is {:?}; it must be between {LIGHTEST:.0e} and {:.0e}",
             net[i].w,
             LIGHTEST.recip()
         ))),
