@@ -15,6 +15,9 @@ use crate::Result;
 
 /// Fewest jobs of a round that are worth calling helpers for.
 const MIN_PARALLEL: usize = 4;
+/// Jobs that the leader does alone before it calls helpers: half a millisecond, ten times what calling one takes. Small solves, of
+/// which there are thousands in a segmentation, have none.
+const ALONE: usize = 128;
 /// Glances at the next round before a helper lets other threads run.
 const GLANCES: u32 = 1000;
 
@@ -66,6 +69,7 @@ pub(super) fn run<S: Send + Sync, O: Default + Send, B: Default>(
         let _over = OnDrop(|| deck.round.store(0, Ordering::Release));
         let mut bench = B::default();
         let mut crew = 1;
+        let mut before = 0;
         loop {
             let jobs = deck.begin_round(crew, &mut lead)?;
             if jobs == 0 {
@@ -73,7 +77,9 @@ pub(super) fn run<S: Send + Sync, O: Default + Send, B: Default>(
             }
             let deck = &deck;
             let work = &work;
-            while jobs >= MIN_PARALLEL && crew < rayon::current_num_threads() {
+            let pays = jobs >= MIN_PARALLEL && before >= ALONE;
+            before += jobs;
+            while pays && crew < rayon::current_num_threads() {
                 scope.spawn(move || deck.help(crew, work));
                 crew += 1;
             }

@@ -459,27 +459,29 @@ fn best_foot(
     });
     let shifts = cones.shifts(field, col, row);
     let mut best: Option<(f64, DVec2)> = None;
-    let mut offer = |value: f64, foot: DVec2| {
-        if best.is_none_or(|(least, _)| value < least) {
-            best = Some((value, foot));
-        }
-    };
     let place = |k: usize| DVec2::new(f64::from(RING[k].0), f64::from(RING[k].1));
     for axis in (0..8).step_by(2) {
         for diagonal in [(axis + 1) % 8, (axis + 7) % 8] {
             let (a, b) = (ring[axis], ring[diagonal]);
             let (ga, gb) = (f64::from(a) + shifts[axis], f64::from(b) + shifts[diagonal]);
-            match (a < UNREACHED, b < UNREACHED) {
+            // No way is shorter than what it adds to.
+            if best.is_some_and(|(least, _)| ga.min(gb) >= least) {
+                continue;
+            }
+            let (value, foot) = match (a < UNREACHED, b < UNREACHED) {
                 (true, true) => {
                     let (value, theta) = segment(ga, place(axis), gb, place(diagonal), metric);
-                    offer(value, place(axis).lerp(place(diagonal), theta));
+                    (value, place(axis).lerp(place(diagonal), theta))
                 }
-                (true, false) => offer(ga + metric.norm(place(axis)), place(axis)),
+                (true, false) => (ga + metric.norm(place(axis)), place(axis)),
                 // Past an axis neighbour, on this side or the other; between two walls there is no way.
                 (false, true) if a.min(ring[(2 * diagonal + 8 - axis) % 8]) < f32::INFINITY => {
-                    offer(gb + metric.norm(place(diagonal)), place(diagonal));
+                    (gb + metric.norm(place(diagonal)), place(diagonal))
                 }
-                _ => {}
+                _ => continue,
+            };
+            if best.is_none_or(|(least, _)| value < least) {
+                best = Some((value, foot));
             }
         }
     }

@@ -67,13 +67,19 @@ impl Standing<'_> {
                 !goals.is_empty() && goals.iter().all(|&goal| self.is_settled(goal) != Some(false))
             }
             Stop::AnyGoal(goals) => goals.iter().any(|&goal| self.is_settled(goal) == Some(true)),
-            Stop::Distance(_) => {
-                // A node not reached by now is farther than the least news; one reached may still come down by its slack.
-                let slack = self.limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
-                self.news - slack > stop.largest(self.field)
-            }
+            Stop::Distance(_) => self.news > self.last_news(stop),
             Stop::Nodes(count) => self.reached >= *count && self.final_nodes() >= *count,
         }
+    }
+
+    /// The greatest news that can bear on a value to be reported: a node not reached by then is farther, one reached
+    /// may still come down by its slack.
+    pub(super) fn last_news(&self, stop: &Stop) -> f32 {
+        if !matches!(stop, Stop::Distance(_)) {
+            return UNREACHED;
+        }
+        let slack = self.limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
+        stop.largest(self.field) + slack
     }
 
     fn final_nodes(&self) -> usize {

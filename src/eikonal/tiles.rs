@@ -348,7 +348,8 @@ pub(super) fn solve(
                 return Ok(0);
             }
             statistics.rounds += 1;
-            queue.take(&tiling, least + window, statistics.rounds as u32, taken);
+            let limit = (least + window).min(standing.last_news(stop));
+            queue.take(&tiling, limit, statistics.rounds as u32, taken);
             Ok(taken.len())
         };
     let Shared { board, queue, .. } = crew::run(shared, lead, work)?;

@@ -1,6 +1,7 @@
 //! The curvature tensor CT of the paper, equation (4).
 
 use super::Sym2;
+use crate::surface::Forms;
 use crate::{HeightJet, SurfaceJet};
 
 /// `G⁻¹`, the speed tensor of the geodesic distance, and its determinant.
@@ -63,8 +64,7 @@ pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
 
 /// The same on any surface, in grid coordinates: the first formula above with `H`, `K`, `G` and `B` as they are.
 pub(crate) fn of_surface(jet: &SurfaceJet, delta: f64) -> Sym2 {
-    let (inverse, b) = (jet.first_form().inverse(), jet.second_form());
-    let [h, k] = jet.mean_and_gaussian();
+    let Forms { inverse, second: b, mean: h, gaussian: k } = jet.forms();
     let (q, c, sum) = if k < 0.0 {
         let r = (h * h - k).sqrt();
         (-h / r, delta + r + h * h / r, 2.0 * r)

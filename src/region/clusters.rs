@@ -7,6 +7,9 @@ use crate::eikonal::TensorField;
 use crate::metric::Difference;
 use crate::{Control, DistanceMap, Error, ParametricSurface, Result, Solver, Stop};
 
+/// Half the side of the window in which the first cluster is solved, in nodes.
+const REACH: usize = 24;
+
 /// Most clusters of a cover: beyond this `ε` is surely a mistake.
 const MOST: usize = 1 << 16;
 
@@ -48,26 +51,57 @@ pub fn cluster(
     epsilon: f64,
     control: &Control,
 ) -> Result<Vec<(usize, f32)>> {
-    /// Half the side of the first window.
-    const REACH: usize = 24;
     let [col, row] = seed;
     if col >= field.cols() || row >= field.rows() {
         return Err(Error::usage(format!("the seed ({col}, {row}) is not on the grid")));
     }
-    if !field.is_open(col, row) {
-        return Ok(Vec::new());
-    }
-    let stop = Stop::Distance(epsilon);
-    let mut reach = REACH;
-    loop {
-        let span = |at: usize, count: usize| at.saturating_sub(reach)..count.min(at + reach);
-        let (part, first) = field.crop([span(col, field.cols()), span(row, field.rows())]);
-        let start = DVec2::new((col - first[0]) as f64, (row - first[1]) as f64);
-        let map = Solver::default().solve_field(part, &[start.into()], &stop, control)?;
-        if let Some(nodes) = held(&map, first, field) {
-            return Ok(nodes);
+    Clusters { field, reach: REACH, looked_at: 0 }.around(seed, epsilon, control)
+}
+
+/// Finds one cluster after the other.
+struct Clusters<'a> {
+    field: &'a TensorField,
+    /// Half the side of the window that the next cluster is solved in, in nodes: a little more than the last one took.
+    reach: usize,
+    /// Nodes of all windows so far.
+    looked_at: usize,
+}
+
+impl Clusters<'_> {
+    /// See [`cluster`].
+    fn around(
+        &mut self,
+        [col, row]: [usize; 2],
+        epsilon: f64,
+        control: &Control,
+    ) -> Result<Vec<(usize, f32)>> {
+        let field = self.field;
+        if !field.is_open(col, row) {
+            return Ok(Vec::new());
         }
-        reach *= 2;
+        let stop = Stop::Distance(epsilon);
+        loop {
+            let span = |at: usize, count: usize| {
+                at.saturating_sub(self.reach)..count.min(at + self.reach + 1)
+            };
+            let (part, first) = field.crop([span(col, field.cols()), span(row, field.rows())]);
+            let start = DVec2::new((col - first[0]) as f64, (row - first[1]) as f64);
+            let map = Solver::default().solve_field(part, &[start.into()], &stop, control)?;
+            self.looked_at += map.cols() * map.rows();
+            if let Some(nodes) = held(&map, first, field) {
+                // A periodic direction is whole in any window.
+                let [around, about] = field.tiling.periodic;
+                let far = |&(place, _): &(usize, f32)| {
+                    let across = (place % field.cols()).abs_diff(col);
+                    let down = (place / field.cols()).abs_diff(row);
+                    (if around { 0 } else { across }).max(if about { 0 } else { down })
+                };
+                let farthest = nodes.iter().map(far).max().unwrap_or(0);
+                self.reach = farthest + farthest / 4 + 2;
+                return Ok(nodes);
+            }
+            self.reach *= 2;
+        }
     }
 }
 
@@ -120,8 +154,9 @@ pub(super) fn cover(
     order.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut seeds = Vec::new();
     let quiet = control.quiet();
-    let around =
-        |place: usize, epsilon: f64| cluster(field, [place % cols, place / cols], epsilon, &quiet);
+    let mut clusters = Clusters { field, reach: REACH, looked_at: 0 };
+    let mut around =
+        |place: usize, epsilon: f64| clusters.around([place % cols, place / cols], epsilon, &quiet);
     let epsilon = match (epsilon, order.first()) {
         (Some(epsilon), _) => epsilon,
         (None, Some(&(_, first))) => {

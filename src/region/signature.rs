@@ -95,13 +95,13 @@ pub fn signatures(
         let size = sizes[region as usize];
         match neighbours {
             Neighbours::Surface => {
-                for v in place.along_surface(jet, size.side * STEP) {
-                    sum.add(jet.area(), v);
+                if let Some([most, least]) = place.along_surface(jet, size.side * STEP) {
+                    sum.add(jet.area(), &Moments::of_pairs(most, least));
                 }
             }
             Neighbours::Grid => {
                 if let Some(v) = place.along_grid(size.side) {
-                    sum.add(jet.area(), v);
+                    sum.add(jet.area(), &Moments::of(v));
                 }
             }
         }
@@ -241,15 +241,12 @@ impl Place<'_> {
         }
         let low = by.floor();
         let DVec2 { x: u, y: v } = by - low;
+        let (col, row) = (low.x as isize, low.y as isize);
+        let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
         let mut sum = [0.0; 6];
-        for (col, row, weight) in [
-            (0, 0, (1.0 - u) * (1.0 - v)),
-            (1, 0, u * (1.0 - v)),
-            (0, 1, (1.0 - u) * v),
-            (1, 1, u * v),
-        ] {
+        for ((i, j), weight) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().zip(weights) {
             if weight > 0.0 {
-                let tensor = self.tensor(low.x as isize + col, low.y as isize + row)?;
+                let tensor = self.tensor(col + i, row + j)?;
                 sum.iter_mut().zip(tensor).for_each(|(sum, c)| *sum += weight * c);
             }
         }
@@ -265,21 +262,16 @@ impl Place<'_> {
         Some([a, b, c, d])
     }
 
-    /// Differences to the neighbours at a distance of `step`, per distance. Which way along a tangent is plus is
-    /// arbitrary, so all four choices are given.
-    fn along_surface(&self, jet: &SurfaceJet, step: f64) -> impl Iterator<Item = [f64; 4]> {
-        let pairs = self.tensor(0, 0).and_then(|here| {
-            let l = |to| Some(distance(here, &self.sample(to)?) / step);
-            let pair = |way: DVec2| {
-                let bend = geodesic_bend(jet, way) * (0.5 * step * step);
-                both(l(way * step - bend), l(way * -step - bend))
-            };
-            let [most, least] = self.tangents(jet);
-            Some((pair(most)?, pair(least)?))
-        });
-        pairs
-            .into_iter()
-            .flat_map(|([a, b], [c, d])| [[a, b, c, d], [b, a, c, d], [a, b, d, c], [b, a, d, c]])
+    /// Differences to the neighbours at a distance of `step` both ways along the two tangents, per distance.
+    fn along_surface(&self, jet: &SurfaceJet, step: f64) -> Option<[[f64; 2]; 2]> {
+        let here = self.tensor(0, 0)?;
+        let l = |to| Some(distance(here, &self.sample(to)?) / step);
+        let pair = |way: DVec2| {
+            let bend = geodesic_bend(jet, way) * (0.5 * step * step);
+            both(l(way * step - bend), l(way * -step - bend))
+        };
+        let [most, least] = self.tangents(jet);
+        Some([pair(most)?, pair(least)?])
     }
 
     /// The orthogonal unit tangents, in grid coordinates, along which `C` changes most and least: the eigenvectors of the
@@ -314,7 +306,7 @@ fn both(plus: Option<f64>, minus: Option<f64>) -> Option<[f64; 2]> {
 /// Unit eigenvector of the larger eigenvalue.
 fn long_axis(form: Sym2) -> DVec2 {
     let half = 0.5 * (form.xx - form.yy);
-    let radius = half.hypot(form.xy);
+    let radius = (half * half + form.xy * form.xy).sqrt();
     // Of the two expressions, the one that does not cancel.
     let axis = if half >= 0.0 {
         DVec2::new(half + radius, form.xy)
@@ -398,14 +390,31 @@ struct Moments {
 }
 
 impl Moments {
-    fn add(&mut self, weight: f64, v: [f64; 4]) {
-        if !v.iter().all(|v| v.is_finite()) {
+    /// Those of one vector.
+    fn of(v: [f64; 4]) -> Self {
+        Self { weight: 1.0, first: v, second: v.map(|a| v.map(|b| a * b)) }
+    }
+
+    /// The mean of those of `(a, b, c, d)`, `(b, a, c, d)`, `(a, b, d, c)` and `(b, a, d, c)`: which way along a tangent is plus is
+    /// arbitrary.
+    fn of_pairs([a, b]: [f64; 2], [c, d]: [f64; 2]) -> Self {
+        let (x, y) = (0.5 * (a + b), 0.5 * (c + d));
+        let (xx, yy) = (0.5 * (a * a + b * b), 0.5 * (c * c + d * d));
+        let (ab, cd, xy) = (a * b, c * d, x * y);
+        let second = [[xx, ab, xy, xy], [ab, xx, xy, xy], [xy, xy, yy, cd], [xy, xy, cd, yy]];
+        Self { weight: 1.0, first: [x, x, y, y], second }
+    }
+
+    /// Adds others `weight` times, if they are finite.
+    fn add(&mut self, weight: f64, other: &Self) {
+        if !other.first.iter().all(|v| v.is_finite()) {
             return;
         }
-        self.weight += weight;
+        self.weight += weight * other.weight;
         for i in 0..4 {
-            self.first[i] += weight * v[i];
-            self.second[i].iter_mut().zip(v).for_each(|(sum, v_j)| *sum += weight * v[i] * v_j);
+            self.first[i] += weight * other.first[i];
+            let sums = self.second[i].iter_mut().zip(other.second[i]);
+            sums.for_each(|(sum, more)| *sum += weight * more);
         }
     }
 
@@ -421,11 +430,7 @@ impl Moments {
 
 impl Sum for Moments {
     fn merge(&mut self, other: &Self) {
-        self.weight += other.weight;
-        for i in 0..4 {
-            self.first[i] += other.first[i];
-            self.second[i].iter_mut().zip(other.second[i]).for_each(|(sum, more)| *sum += more);
-        }
+        self.add(1.0, other);
     }
 }
 

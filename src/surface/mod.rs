@@ -23,5 +23,6 @@ pub(crate) use self::block::{BLOCK, JetBlock, Lanes};
 pub use self::curvature::Curvature;
 pub use self::height::{Degree, FitOptions, HeightJet, HeightSurface, Smoothing};
 pub use self::nurbs::{Knots, NurbsCurve, NurbsGrid, NurbsSurface};
+pub(crate) use self::parametric::Forms;
 pub use self::parametric::{Measures, ParametricSurface, SurfaceJet};
 pub use self::residuals::Residuals;

@@ -94,6 +94,19 @@ pub struct SurfaceJet {
     pub second: [DVec3; 3],
 }
 
+/// What is known from the first and the second fundamental form.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Forms {
+    /// `G⁻¹`.
+    pub(crate) inverse: Sym2,
+    /// `B`.
+    pub(crate) second: Sym2,
+    /// `H`.
+    pub(crate) mean: f64,
+    /// `K`.
+    pub(crate) gaussian: f64,
+}
+
 impl SurfaceJet {
     /// First fundamental form `G = JᵀJ`, `J = [S_1 S_2]`.
     #[must_use]
@@ -122,17 +135,28 @@ impl SurfaceJet {
     #[must_use]
     pub fn is_regular(&self) -> bool {
         let [a, b] = self.first;
-        let area = self.area();
-        area > 1e-9 * a.length() * b.length() && area.is_finite()
+        let square = b.cross(a).length_squared();
+        square > 1e-18 * a.length_squared() * b.length_squared() && square.is_finite()
     }
 
     /// Mean curvature `H = tr(G⁻¹B)/2`, 1/m, and Gaussian curvature `K = det B/det G`, 1/m².
     #[must_use]
     pub fn mean_and_gaussian(&self) -> [f64; 2] {
-        let (g, b) = (self.first_form(), self.second_form());
-        let det = self.area().powi(2);
-        let trace = g.yy * b.xx - 2.0 * g.xy * b.xy + g.xx * b.yy;
-        [0.5 * trace / det, b.det() / det]
+        let Forms { mean, gaussian, .. } = self.forms();
+        [mean, gaussian]
+    }
+
+    /// All that the two forms give, from one root and one division: with `N = S_2 × S_1`, `det G = N²` and `B_ij = S_ij·N/|N|`.
+    #[inline]
+    pub(crate) fn forms(&self) -> Forms {
+        let (g, [a, b]) = (self.first_form(), self.first);
+        let normal = b.cross(a);
+        let inverse_det = normal.length_squared().recip();
+        let [xx, xy, yy] = self.second.map(|s| s.dot(normal));
+        let second = Sym2::new(xx, xy, yy) * inverse_det.sqrt();
+        let inverse = Sym2::new(g.yy, -g.xy, g.xx) * inverse_det;
+        let trace = inverse.xx * second.xx + 2.0 * inverse.xy * second.xy + inverse.yy * second.yy;
+        Forms { inverse, second, mean: 0.5 * trace, gaussian: second.det() * inverse_det }
     }
 
     /// `κ1² + κ2² = 4H² − 2K`, 1/m².

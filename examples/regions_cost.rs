@@ -1,0 +1,88 @@
+//! What regions and signatures cost: milliseconds of each stage, medians, by size, metric and threads.
+//!
+//! `cargo run --release --example regions_cost [NODES]...` for sides of so many nodes, 100 and 1000 if none are given.
+
+use std::time::Instant;
+
+use glam::DVec2;
+use rayon::ThreadPoolBuilder;
+use ridgeway::eikonal::TensorField;
+use ridgeway::region::{
+    Neighbours, SegmentOptions, Segmentation, difference_ranks, gaussian_ranks, signatures,
+};
+use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Result, Solver, Stop};
+
+/// Radius of the clusters for some 100 regions of 1000 × 1000 nodes, and for few of 100 × 100.
+const STAGES: [&str; 5] = ["metric", "solve", "ranks", "cover, labels", "signatures"];
+
+fn main() -> Result<()> {
+    let sizes: Vec<usize> = std::env::args().skip(1).filter_map(|size| size.parse().ok()).collect();
+    let sizes = if sizes.is_empty() { vec![100, 1000] } else { sizes };
+    println!(
+        "{:>20} {:>7} {:>7} {}",
+        "",
+        "threads",
+        "regions",
+        STAGES.map(|s| format!("{s:>13}")).concat()
+    );
+    for nodes in sizes {
+        let range = Synthetic::new(SyntheticKind::Range, nodes, nodes, 30.0)?;
+        let terrain = range.with_seed(1).terrain(Crs::none(), DVec2::ZERO)?;
+        let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default())?;
+        let curvature = Metric::Curvature(Default::default());
+        let difference = Metric::Difference(Default::default());
+        for metric in [curvature, difference] {
+            for threads in [1, 2] {
+                let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+                let runs: Vec<_> = (0..if nodes > 300 { 5 } else { 21 })
+                    .map(|_| pool.install(|| stages(&surface, &metric)))
+                    .collect::<Result<_>>()?;
+                let median = |stage: usize| {
+                    let mut times: Vec<f64> = runs.iter().map(|run| run.1[stage]).collect();
+                    times.sort_by(f64::total_cmp);
+                    times[times.len() / 2]
+                };
+                let times: String =
+                    (0..STAGES.len()).map(|s| format!("{:>13.2}", median(s))).collect();
+                let name =
+                    if matches!(metric, Metric::Curvature(_)) { "curvature" } else { "difference" };
+                println!("{name:>10} {nodes:>4}²     {threads:>7} {:>7} {times}", runs[0].0);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Regions, and milliseconds of each stage.
+fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; 5])> {
+    let control = Control::default();
+    let mut times = [0.0; 5];
+    let mut clock = Instant::now();
+    let mut lap = |stage: usize| {
+        times[stage] += 1e3 * clock.elapsed().as_secs_f64();
+        clock = Instant::now();
+    };
+    let field = TensorField::sample(&metric.on(surface, &Modifiers::default())?, &control)?;
+    lap(0);
+    let start = DVec2::splat(0.5 * (field.cols() - 1) as f64);
+    let copy = field.clone();
+    let map = Solver::default().solve_field(copy, &[start.into()], &Stop::Never, &control)?;
+    lap(1);
+    let farthest = map.to_row_major().into_iter().fold(0f32, f32::max);
+    drop(map);
+    lap(1);
+    let ranks = match metric {
+        Metric::Difference(difference) => difference_ranks(surface, difference, &control)?,
+        _ => gaussian_ranks(surface),
+    };
+    lap(2);
+    // Some hundred regions.
+    let options =
+        SegmentOptions { epsilons: vec![f64::from(farthest) / 9.0], ..SegmentOptions::default() };
+    let cut = Segmentation::of(&field, &ranks, &options, &control)?;
+    lap(3);
+    signatures(surface, &cut.levels[0].labels, Neighbours::Surface, &control)?;
+    lap(4);
+    Ok((cut.levels[0].regions.len(), times))
+}
