@@ -156,8 +156,10 @@ impl StartRegion {
         let mut set = |col, row, length| set(col, row, travelled + length);
         for (at, sides) in self.corners() {
             let Some(cone) = Cone::new(field, at, sides, travelled) else { continue };
+            let is_clear = is_clear(field, at, POINT_RADIUS);
             near(field, at, at, POINT_RADIUS, |col, row, node, _| {
                 if cone.holds(node - at)
+                    && (is_clear || sees(field, node, at))
                     && let Some(length) = geodesic(field, node, at)
                 {
                     set(col, row, length);
@@ -317,13 +319,10 @@ fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
 
 /// Length of the geodesic between two points nearby in stored units: `d² = E − B` up to fourth order in the distance,
 /// with the energy `E = ∫ vᵀMv` of the chord `v` and what bending saves, `B = ‖Γ(v, v)‖²_D/12` by the Christoffel
-/// symbols at its middle. `None` where a wall is in the way.
+/// symbols at its middle. Both points see each other.
 fn geodesic(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
     /// The expansion is no good where bending would save more than this share.
     const MOST: f64 = 0.2;
-    if !sees(field, a, b) {
-        return None;
-    }
     let v = b - a;
     let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
     let mut energy = 0.0;
@@ -346,6 +345,15 @@ fn geodesic(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
     let bend = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
     let saved = field.metric_at(middle)?.inverse().form(bend) / 12.0;
     Some((energy - saved.min(MOST * energy)).sqrt())
+}
+
+/// Whether no node of the cells within `radius` of a point is closed: then all points there see each other.
+fn is_clear(field: &TensorField, at: DVec2, radius: f64) -> bool {
+    let (least, most) = ((at - radius).floor(), (at + radius).floor() + 1.0);
+    (least.y as isize..=most.y as isize).all(|row| {
+        (least.x as isize..=most.x as isize)
+            .all(|col| field.tiling.node(col, row).is_none_or(|(c, r)| field.is_open(c, r)))
+    })
 }
 
 /// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones.

@@ -75,27 +75,6 @@ pub struct Change {
     pub area: f64,
 }
 
-/// Differences `l_1^+, l_1^-, l_2^+, l_2^-` of the curvature tensor to the neighbours of every node, row-major; NaN where there is no
-/// neighbour: beyond a border and on a void. In m, or divided by the length of the step if `per_length`.
-///
-/// # Errors
-/// A `δ` out of range; cancelled.
-pub fn neighbour_differences(
-    surface: &dyn ParametricSurface,
-    curvature_delta: Delta,
-    per_length: bool,
-    control: &Control,
-) -> Result<Vec<[f64; 4]>> {
-    let measures = surface.measures();
-    let delta = curvature_delta.resolve(|| measures.rms_curvature, measures.area.sqrt())?;
-    at_nodes(surface, delta, control, |around| {
-        [0, 1, 2, 3].map(|k| {
-            let length = if per_length { around.step(k) } else { 1.0 };
-            around.difference(k) / length
-        })
-    })
-}
-
 impl Difference {
     /// How the curvature tensor changes around every node, row-major. 280 ns of one core per node with what [`Metric::on`](crate::Metric::on)
     /// makes of it, and 32 bytes.
@@ -222,11 +201,10 @@ impl Frame {
     }
 }
 
-/// A node: `S_1`, `S_2` and the unit normal there, and CT in space.
-#[derive(Clone, Copy, Debug)]
+/// A node: `S_1` and `S_2` there, and CT in space.
+#[derive(Debug)]
 struct Node {
     first: [DVec3; 2],
-    normal: DVec3,
     form: Sym2,
     tensor: DMat3,
     /// Whether neighbours may look at it.
@@ -244,12 +222,17 @@ impl Node {
         let regular = jet.is_regular();
         let form = if regular { jet.first_form() } else { Sym2::new(f64::NAN, f64::NAN, f64::NAN) };
         let counts = regular && !void && tensor.is_finite();
-        Self { first: jet.first, normal: jet.normal(), form, tensor, counts }
+        Self { first: jet.first, form, tensor, counts }
+    }
+
+    /// Unit normal.
+    fn normal(&self) -> DVec3 {
+        self.first[1].cross(self.first[0]).normalize()
     }
 
     /// CT transported to a neighbour, along with the tangent plane.
     fn seen_from(&self, other: &Self) -> DMat3 {
-        let turn = DMat3::from_quat(DQuat::from_rotation_arc(self.normal, other.normal));
+        let turn = DMat3::from_quat(DQuat::from_rotation_arc(self.normal(), other.normal()));
         turn * self.tensor * turn.transpose()
     }
 }
@@ -264,12 +247,6 @@ impl Around<'_> {
     /// `l` to neighbour `k`, m; NaN if there is none.
     fn difference(&self, k: usize) -> f64 {
         self.beside[k].map_or(f64::NAN, |there| norm(there.tensor - self.here.tensor))
-    }
-
-    /// Length of the step to neighbour `k`, m, by the trapezoidal rule.
-    fn step(&self, k: usize) -> f64 {
-        let along = |node: &Node| if k < 2 { node.form.xx } else { node.form.yy }.sqrt();
-        self.beside[k].map_or(f64::NAN, |there| 0.5 * (along(self.here) + along(there)))
     }
 
     /// A derivative in space whose tangential part is `∇C` along `u_j`: central, one-sided where a neighbour is missing, 0 where both
@@ -341,9 +318,8 @@ fn at_nodes<T: Clone + Default + Send>(
             let after = beside(row, rows, down)[0].map(load);
             for (col, out) in values.iter_mut().enumerate() {
                 let [east, west] = beside(col, cols, across).map(|col| Some(&here[col?]));
-                let in_row = |row: &'_ Option<Vec<Node>>| row.as_ref().map(|row| row[col]);
-                let (south, north) = (in_row(&after), in_row(&before));
-                let beside = [east, west, south.as_ref(), north.as_ref()];
+                let [south, north] = [&after, &before].map(|row| row.as_ref().map(|row| &row[col]));
+                let beside = [east, west, south, north];
                 let beside = beside.map(|node| node.filter(|node| node.counts));
                 *out = value(&Around { here: &here[col], beside });
             }
@@ -564,20 +540,16 @@ mod tests {
             periodic: [true, false],
             ..square(side, cylinder)
         };
-        let differences = |per_length| {
-            let control = Control::default();
-            neighbour_differences(&ring, Delta::Absolute(0.25), per_length, &control).unwrap()
-        };
+        let control = Control::default();
+        let differences =
+            at_nodes(&ring, 0.25, &control, |around| [0, 1, 2, 3].map(|k| around.difference(k)));
         // ttᵀ, turned by the angle θ, is √2 sin θ away.
         let angle = 2.0 * PI / side as f64;
         let chord = SQRT_2 * angle.sin() / 0.75;
-        for (l, row) in differences(false).iter().zip((0..).map(|i| i / side)) {
+        for (l, row) in differences.unwrap().iter().zip((0..).map(|i| i / side)) {
             assert!((l[0] - chord).abs() < 1e-12 && (l[1] - chord).abs() < 1e-12, "{l:?}");
             assert!(if row < 6 { l[2] < 1e-12 } else { l[2].is_nan() });
             assert!(if row > 0 { l[3] < 1e-12 } else { l[3].is_nan() });
-        }
-        for l in differences(true) {
-            assert!(l[..2].iter().all(|l| (l * 2.0 * angle - chord).abs() < 1e-12));
         }
     }
 

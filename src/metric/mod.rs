@@ -28,7 +28,7 @@ use rayon::prelude::*;
 
 pub(crate) use self::block::SpeedBlock;
 pub(crate) use self::curvature::of_surface;
-pub use self::difference::{Change, Difference, DifferenceForm, neighbour_differences};
+pub use self::difference::{Change, Difference, DifferenceForm};
 pub use self::space::SurfaceMetric;
 pub use self::sym2::Sym2;
 use crate::surface::BLOCK;

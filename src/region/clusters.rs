@@ -4,8 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::eikonal::TensorField;
-use crate::metric::Difference;
-use crate::{Control, DistanceMap, Error, ParametricSurface, Result, Solver, Stop};
+use crate::{Control, DistanceMap, Error, Metric, ParametricSurface, Result, Solver, Stop};
 
 /// Half the side of the window in which the first cluster is solved, in nodes.
 const REACH: usize = 24;
@@ -24,15 +23,17 @@ pub fn gaussian_ranks(surface: &dyn ParametricSurface) -> Vec<f64> {
     (0..surface.rows()).into_par_iter().flat_map_iter(of_row).collect()
 }
 
-/// `γ1 γ2` at the nodes, row-major: the order of seeds for the difference metric. Cost: as to bind the metric.
+/// What the nodes are ranked by as seeds under a metric, row-major: `γ1 γ2` on the difference metric, which is least where the shape
+/// changes least, [`gaussian_ranks`] on the others. Cost: one evaluation of the surface per node; as to bind the difference metric.
 ///
 /// # Errors
 /// A `δ` of the curvature tensor out of range; cancelled.
-pub fn difference_ranks(
+pub fn seed_ranks(
     surface: &dyn ParametricSurface,
-    difference: &Difference,
+    metric: &Metric,
     control: &Control,
 ) -> Result<Vec<f64>> {
+    let Metric::Difference(difference) = metric else { return Ok(gaussian_ranks(surface)) };
     let changes = difference.changes(surface, control)?;
     Ok(changes.iter().map(|change| change.gamma.det()).collect())
 }
@@ -188,4 +189,32 @@ pub(super) fn cover(
 /// Grid coordinates of a place in the row-major grid.
 pub(super) fn node(place: usize, cols: usize) -> DVec2 {
     DVec2::new((place % cols) as f64, (place / cols) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sym2;
+
+    #[test]
+    fn clusters_look_at_few_nodes_beyond_their_own() {
+        let tensor = |col: usize, row: usize| {
+            let speed = 1.0 + 0.5 * (0.05 * (col + 2 * row) as f64).sin();
+            Some(Sym2::new(speed, 0.0, 2.0 - speed))
+        };
+        let field = TensorField::from_fn(400, 400, tensor, &Control::default()).unwrap();
+        for (epsilon, most) in [(5.0, 16.0), (20.0, 5.0), (80.0, 4.0)] {
+            let mut clusters = Clusters { field: &field, reach: REACH, looked_at: 0 };
+            let mut held = 0;
+            for seed in (0..40).map(|i| [(i * 97) % 400, (i * 151) % 400]) {
+                let nodes = clusters.around(seed, epsilon, &Control::default()).unwrap();
+                // The window of the cluster before, and the distances in it, change little.
+                let alone = cluster(&field, seed, epsilon, &Control::default()).unwrap();
+                assert!(nodes.len().abs_diff(alone.len()) * 50 < alone.len(), "{seed:?}");
+                held += nodes.len();
+            }
+            let share = clusters.looked_at as f64 / held as f64;
+            assert!(share < most, "{epsilon}: {share}");
+        }
+    }
 }

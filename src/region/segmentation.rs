@@ -82,8 +82,7 @@ pub struct Segmentation {
 
 impl Segmentation {
     /// Cuts the open nodes of a field. Seeds are taken in ascending order of `ranks`, one for each node, row-major:
-    /// [`gaussian_ranks`](super::gaussian_ranks) for the curvature metric, [`difference_ranks`](super::difference_ranks) for the
-    /// difference metric.
+    /// [`seed_ranks`](super::seed_ranks) gives them.
     ///
     /// # Cost
     /// Some 2 µs of one core per node and level, with its ranks; 0.3 ms and 3 kB per region. `docs/regions.md` has measurements.

@@ -207,12 +207,20 @@ impl Over<'_> {
 
     /// The node at a place beside the grid or in it.
     fn node(&self, col: isize, row: isize) -> Option<usize> {
-        let within = |at: isize, count: usize, periodic: bool| {
-            let at = if periodic { at.rem_euclid(count as isize) } else { at };
-            usize::try_from(at).ok().filter(|&at| at < count)
+        let within = |at: isize, count: usize, periodic: bool| match usize::try_from(at) {
+            Ok(at) if at < count => Some(at),
+            _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
         };
         let [around, about] = self.periodic;
         Some(within(row, self.rows, about)? * self.cols + within(col, self.cols, around)?)
+    }
+
+    /// The corners of the cell that begins at a place, if it lies in the grid and is not over a seam.
+    fn cell(&self, col: isize, row: isize) -> Option<[usize; 4]> {
+        let (col, row) = (usize::try_from(col).ok()?, usize::try_from(row).ok()?);
+        let first = row * self.cols + col;
+        (col + 1 < self.cols && row + 1 < self.rows)
+            .then(|| [first, first + 1, first + self.cols, first + self.cols + 1])
     }
 }
 
@@ -226,6 +234,7 @@ struct Place<'a> {
 
 impl Place<'_> {
     /// `C` at the node `(col, row)` steps away.
+    #[inline]
     fn tensor(&self, col: isize, row: isize) -> Option<&Tensor> {
         let node = self.over.node(self.node[0] as isize + col, self.node[1] as isize + row)?;
         (self.over.labels[node] == Some(self.region)).then(|| &self.tensors[node])
@@ -244,10 +253,22 @@ impl Place<'_> {
         let (col, row) = (low.x as isize, low.y as isize);
         let weights = [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v];
         let mut sum = [0.0; 6];
-        for ((i, j), weight) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().zip(weights) {
-            if weight > 0.0 {
-                let tensor = self.tensor(col + i, row + j)?;
-                sum.iter_mut().zip(tensor).for_each(|(sum, c)| *sum += weight * c);
+        let mut add = |weight: f64, tensor: &Tensor| {
+            sum.iter_mut().zip(tensor).for_each(|(sum, c)| *sum += weight * c);
+        };
+        let [here_col, here_row] = self.node.map(|at| at as isize);
+        let is_inside = |&node: &usize| self.over.labels[node] == Some(self.region);
+        match self.over.cell(here_col + col, here_row + row) {
+            Some(corners) if u * v > 0.0 && corners.iter().all(is_inside) => {
+                corners.iter().zip(weights).for_each(|(&i, weight)| add(weight, &self.tensors[i]));
+            }
+            // Beside a border or a seam one by one, and only those that count.
+            _ => {
+                for ((i, j), weight) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().zip(weights) {
+                    if weight > 0.0 {
+                        add(weight, self.tensor(col + i, row + j)?);
+                    }
+                }
             }
         }
         Some(sum)

@@ -3,8 +3,8 @@
 use ridgeway::eikonal::TensorField;
 use ridgeway::export::{Samples, regions_geojson};
 use ridgeway::region::{
-    Level, Neighbours, Polygon, RegionStatistics, Segmentation, Signature, difference_ranks,
-    gaussian_ranks, outlines, signatures, statistics,
+    Level, Neighbours, Polygon, RegionStatistics, Segmentation, Signature, outlines, seed_ranks,
+    signatures, statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
 use ridgeway::{Control, HeightSurface, Metric, MetricField, ParametricSurface, Result, Solver};
@@ -74,10 +74,7 @@ pub(super) fn cut(
     solver: Solver,
     control: &Control,
 ) -> Result<Segmentation> {
-    let ranks = match metric {
-        Metric::Difference(difference) => difference_ranks(surface, difference, control)?,
-        _ => gaussian_ranks(surface),
-    };
+    let ranks = seed_ranks(surface, metric, control)?;
     let mut segmentation = Segmentation::of(&field, &ranks, &regions.options(solver), control)?;
     drop((field, ranks));
     if let Some(tolerance) = regions.merge {
