@@ -85,7 +85,7 @@ impl Segmentation {
     /// [`seed_ranks`](super::seed_ranks) gives them.
     ///
     /// # Cost
-    /// Some 2 µs of one core per node and level, with its ranks; 0.3 ms and 3 kB per region. `docs/regions.md` has measurements.
+    /// Some 1 µs of one core per node and level, with its ranks; 0.16 ms and 3 kB per region. `docs/regions.md` has measurements.
     ///
     /// # Errors
     /// [`Error::Usage`] for options out of range, ranks that are not one per node, no open node, or an `ε` so small that the clusters
