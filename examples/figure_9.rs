@@ -33,6 +33,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             draw(cuts, &found, view, &folder.join(format!("figure-9-{name}.png")))?;
         }
     }
+    let [overlap, nearest] = parts::automatic_letters()?;
+    println!(
+        "letters cut by the defaults: overlap {overlap:.2}, nearest of the same part {nearest:.2}"
+    );
     println!("nodes, metric with solve and labels ms, signatures ms");
     for nodes in [100, 1000] {
         let [regions, signatures] = times(nodes)?;
