@@ -107,6 +107,26 @@ impl Feet {
         reads: [0; SIDE],
     };
 
+    #[inline(always)]
+    fn line(&self, row: usize) -> Line {
+        let place = row * SIDE;
+        let mut triangle = [0; SIDE];
+        for i in 0..SIDE {
+            triangle[i] = u32::from(self.triangle[place + i]);
+        }
+        Line { triangle, theta: lanes(&self.theta, place), rho: lanes(&self.rho, place) }
+    }
+
+    #[inline(always)]
+    fn set_line(&mut self, row: usize, line: &Line) {
+        let places = row * SIDE..(row + 1) * SIDE;
+        self.theta[places.clone()].copy_from_slice(&line.theta);
+        self.rho[places.clone()].copy_from_slice(&line.rho);
+        for (to, triangle) in self.triangle[places].iter_mut().zip(line.triangle) {
+            *to = triangle as u8;
+        }
+    }
+
     /// Mirrors the tile on its diagonal.
     #[inline(always)]
     fn transpose(&mut self) {
@@ -184,25 +204,51 @@ fn find(
     }
     for row in 0..SIDE {
         let at = (from, row);
-        match (tile.cone.is_some(), again) {
-            (true, true) => find_line::<true, true>(around, at, tile, feet, &mut course),
-            (true, false) => find_line::<true, false>(around, at, tile, feet, &mut course),
-            (false, true) => find_line::<false, true>(around, at, tile, feet, &mut course),
-            (false, false) => find_line::<false, false>(around, at, tile, feet, &mut course),
-        }
+        let before = again.then(|| feet.line(row));
+        let line = match (tile.cone.is_some(), &before) {
+            (true, Some(before)) => find_line_again::<true>(around, at, tile, before),
+            (false, Some(before)) => find_line_again::<false>(around, at, tile, before),
+            (true, None) => find_line::<true, 1>(around, at, tile, None),
+            (false, None) => find_line::<false, 1>(around, at, tile, None),
+        };
+        course.add(row, &line);
+        feet.set_line(row, &line);
     }
     course.set(feet, size)
 }
 
-/// Finds the feet of a row of a tile.
+/// The feet of a row of a tile.
+struct Line {
+    triangle: [u32; SIDE],
+    theta: Lanes,
+    rho: Lanes,
+}
+
+/// Finds the feet of a row of a tile from those of the round before. Where one is in another triangle now, which is seldom, the row is
+/// done without them, and with two steps: with one, the error near the pole of a sphere does not fall.
 #[inline(always)]
-fn find_line<const IN_CONE: bool, const AGAIN: bool>(
+fn find_line_again<const IN_CONE: bool>(
+    around: &Surroundings,
+    at: (usize, usize),
+    tile: &Tile<'_>,
+    before: &Line,
+) -> Line {
+    let line = find_line::<IN_CONE, 1>(around, at, tile, Some(before));
+    let mut moved = 0;
+    for i in 0..SIDE {
+        moved |= line.triangle[i] ^ before.triangle[i];
+    }
+    if moved == 0 { line } else { find_line::<IN_CONE, 2>(around, at, tile, None) }
+}
+
+/// Finds the feet of a row of a tile by Newton's method, starting from those `before`, if given, where the triangle is the same.
+#[inline(always)]
+fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
     Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
     at: (usize, usize),
     tile: &Tile<'_>,
-    feet: &mut Feet,
-    course: &mut Course,
-) {
+    before: Option<&Line>,
+) -> Line {
     let row = at.1;
     let mut shifts = [[0f32; SIDE]; 8];
     let (mut m0, mut origin) = ([1.0, 0.0, 1.0], [1.0, 0.0]);
@@ -214,7 +260,7 @@ fn find_line<const IN_CONE: bool, const AGAIN: bool>(
     }
     let ring = rises(g, e, at, RING);
     // Beside the axis neighbours, two lines from that of the node, on either side.
-    let before = rises(g, e, at, [(1, -2), (-2, 1), (-1, -2), (-2, -1)]);
+    let ahead = rises(g, e, at, [(1, -2), (-2, 1), (-1, -2), (-2, -1)]);
     let behind = rises(g, e, at, [(1, 2), (2, 1), (-1, 2), (2, -1)]);
     let metrics = [around(xx, at), around(xy, at), around(yy, at)];
     let own = (0, 0);
@@ -222,11 +268,7 @@ fn find_line<const IN_CONE: bool, const AGAIN: bool>(
     let (g, det) = (seen(g, at, own), seen(det, at, own));
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
     let dets = lanes(&tile.tensors.det, row * SIDE);
-    let places = row * SIDE..(row + 1) * SIDE;
-    let mut old_triangles = [0u8; SIDE];
-    old_triangles.copy_from_slice(&feet.triangle[places.clone()]);
-    let old_thetas = lanes(&feet.theta, row * SIDE);
-    let (mut triangles, mut thetas, mut rhos) = ([0u32; SIDE], [0f32; SIDE], [0f32; SIDE]);
+    let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
     for i in 0..SIDE {
         let ring = around_node(&ring, i);
         let (mut shifted, mut on) = (ring, 0.0);
@@ -249,7 +291,7 @@ fn find_line<const IN_CONE: bool, const AGAIN: bool>(
                 triangle.axis(ring),
                 triangle.diagonal(ring),
                 triangle.opposite(ring),
-                choose(triangle.backwards(), far(&before), far(&behind)),
+                choose(triangle.backwards(), far(&ahead), far(&behind)),
             ],
             slope,
             here: triangle.mirror(here),
@@ -260,21 +302,19 @@ fn find_line<const IN_CONE: bool, const AGAIN: bool>(
                 triangle.mirror(m0),
                 triangle.mirror_place([origin[0] + i as f32, origin[1]]),
             ),
-            known: choose(AGAIN & (bits == u32::from(old_triangles[i])), old_thetas[i], -1.0),
+            known: match before {
+                Some(line) => choose(line.triangle[i] == bits, line.theta[i], -1.0),
+                None => -1.0,
+            },
         };
-        let (theta, rho) = foot.minimise::<IN_CONE>();
+        let (theta, rho) = foot.minimise::<IN_CONE, NEWTON_STEPS>();
         // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
-        triangles[i] = if fixed { Triangle::NONE } else { bits };
-        thetas[i] = choose(fixed, 0.0, theta);
-        rhos[i] = choose(fixed, 0.0, rho);
+        line.triangle[i] = if fixed { Triangle::NONE } else { bits };
+        line.theta[i] = choose(fixed, 0.0, theta);
+        line.rho[i] = choose(fixed, 0.0, rho);
     }
-    course.add(row, &triangles, &thetas);
-    feet.theta[places.clone()].copy_from_slice(&thetas);
-    feet.rho[places.clone()].copy_from_slice(&rhos);
-    for (to, triangle) in feet.triangle[places].iter_mut().zip(triangles) {
-        *to = triangle as u8;
-    }
+    line
 }
 
 /// What the rows and the columns of a tile read, and the sum of the directions from the nodes to where their values
@@ -290,7 +330,8 @@ struct Course {
 impl Course {
     /// Adds a row.
     #[inline(always)]
-    fn add(&mut self, row: usize, triangles: &[u32; SIDE], thetas: &Lanes) {
+    fn add(&mut self, row: usize, line: &Line) {
+        let (triangles, thetas) = (&line.triangle, &line.theta);
         let mut reads = 0;
         for i in 0..SIDE {
             let Triangle { negative, along_y, .. } = Triangle::from_bits(triangles[i]);

@@ -93,10 +93,9 @@ pub(super) struct Foot {
 }
 
 impl Foot {
-    /// `θ` and `ρ`. One step of Newton's method, from the foot of the round before or else of the first order: two steps in all, as the
-    /// pole of a sphere needs; with one the error near it does not fall.
+    /// `θ` and `ρ`.
     #[inline(always)]
-    pub(super) fn minimise<const IN_CONE: bool>(self) -> (f32, f32) {
+    pub(super) fn minimise<const IN_CONE: bool, const NEWTON_STEPS: usize>(self) -> (f32, f32) {
         let Self { rise: [ra, rb, rc, rd], slope, here, cone, known, .. } = self;
         let (mut wa, mut wb, mut wc, mut wd) = (ra, rb, rc, rd);
         if IN_CONE {
@@ -124,19 +123,20 @@ impl Foot {
         let steep = here.2 * greatest(here.2 - d * d, 1e-12 * here.2);
         let phi = -d * across * inverse_root(greatest(across * steep, 1e-30));
         let first_order = phi - middle;
-        let start = greatest(lo, least(hi, choose(known >= 0.0, known, first_order)));
-        let ([_, p0, h0], [va, pa, ha], [vb, pb, hb]) =
-            (here.jet(start), ca.jet(start), cb.jet(start));
-        let (mut pc, mut hc) = (0.0, 0.0);
-        if IN_CONE {
-            let [_, first, second] = far.jet(start);
-            (pc, hc) = (cone.on * first, cone.on * second);
+        let mut t = greatest(lo, least(hi, choose(known >= 0.0, known, first_order)));
+        for _ in 0..NEWTON_STEPS {
+            let ([_, p0, h0], [va, pa, ha], [vb, pb, hb]) = (here.jet(t), ca.jet(t), cb.jet(t));
+            let (mut pc, mut hc) = (0.0, 0.0);
+            if IN_CONE {
+                let [_, first, second] = far.jet(t);
+                (pc, hc) = (cone.on * first, cone.on * second);
+            }
+            let first = pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
+                + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
+            let second = hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
+            let step = choose(second > 1e-6, first / second, 0.0);
+            t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
         }
-        let first = pc + rise - 0.5 * (1.0 - 2.0 * start) * curvature
-            + 0.5 * (p0 + pa + start * (pb - pa) + vb - va);
-        let second = hc + curvature + 0.5 * (h0 + ha + start * (hb - ha) + 2.0 * (pb - pa));
-        let step = choose(second > 1e-6, first / second, 0.0);
-        let t = greatest(lo, least(hi, start - greatest(-0.3, least(0.3, step))));
         let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
         let mut rho = base + t * rise + length - bend;
