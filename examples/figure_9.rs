@@ -30,10 +30,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         output::save(&format!("figure-9-{name}.png"), &draw(cuts, &found, view)?)?;
     }
-    let [overlap, nearest] = parts::automatic_letters()?;
-    println!(
-        "letters cut by the defaults: overlap {overlap:.2}, nearest of the same part {nearest:.2}"
-    );
     println!("nodes, metric with solve and labels ms, signatures ms");
     for nodes in [100, 1000] {
         let [regions, signatures] = times(nodes)?;

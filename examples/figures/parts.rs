@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use ridgeway::metric::{Difference, Metric};
 use ridgeway::region::{
-    Neighbours, SegmentOptions, Segmentation, Signature, gaussian_ranks, seed_ranks, signatures,
+    Neighbours, SegmentOptions, Segmentation, Signature, gaussian_ranks, signatures,
 };
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
@@ -75,77 +75,6 @@ pub(crate) fn swept_letter(scale: f64, radii: [f64; 2]) -> Result<NurbsSurface> 
     let [x, y] = [DVec3::X * radii[0], DVec3::Y * radii[1]].map(|v| v * scale);
     let section = NurbsCurve::ellipse(DVec3::ZERO, x, y)?;
     NurbsSurface::sweep(&section, &NurbsCurve::through(&points, 3)?, DVec3::Z, 80)
-}
-
-/// How alike the regions of the two letters are that the defaults find, on the difference metric, each letter sampled in several ways:
-/// the mean over the surface of the overlap of its region with the most overlapping one of the other letter (intersection over union), and
-/// the share of regions whose nearest signature there is that of this one.
-pub(crate) fn automatic_letters() -> Result<[f64; 2]> {
-    let samplings = [(1.0, 48, 160), (1.0, 40, 130), (0.7, 56, 190), (1.4, 48, 150)];
-    let [first, second] = [(1.0, [0.2, 0.17]), (1.7, [0.21, 0.165])].map(|(scale, radii)| {
-        let cut = |&(ratio, cols, rows)| {
-            let letter = swept_letter(scale, radii)?.reweighted(1, ratio)?;
-            Sampled::new(letter.on_grid(cols, rows)?, ratio)
-        };
-        samplings.iter().map(cut).collect::<Result<Vec<_>>>()
-    });
-    let (first, second) = (first?, second?);
-    let pairs = first.iter().flat_map(|a| second.iter().flat_map(move |b| [(a, b), (b, a)]));
-    let found: Vec<_> = pairs.map(|(a, b)| a.likeness(b)).collect();
-    Ok([0, 1].map(|i| found.iter().map(|pair| pair[i]).sum::<f64>() / found.len() as f64))
-}
-
-/// A tube cut by the defaults on the difference metric, its parameter along reweighted.
-struct Sampled {
-    cut: Cut,
-    ratio: f64,
-}
-
-impl Sampled {
-    fn new(surface: NurbsGrid, ratio: f64) -> Result<Self> {
-        let control = Control::default();
-        let metric = Metric::Difference(Difference::default());
-        let ranks = seed_ranks(&surface, &metric, &control)?;
-        let field = metric.on_surface(&surface)?.sample(&control)?;
-        let cut = Segmentation::of(&field, &ranks, &SegmentOptions::default(), &control)?;
-        let labels = cut.levels[0].labels.clone();
-        Ok(Self { cut: Cut::new("", Box::new(surface), labels)?, ratio })
-    }
-
-    /// The region at a place given as shares of the way round and along, before the reweighting.
-    fn at(&self, [around, along]: [f64; 2]) -> Option<u32> {
-        let moved = self.ratio * along / (1.0 + (self.ratio - 1.0) * along);
-        let (cols, rows) = (self.cut.surface.cols(), self.cut.surface.rows());
-        let (col, row) = (around * cols as f64, (moved * (rows - 1) as f64).round());
-        self.cut.labels[row as usize * cols + col as usize]
-    }
-
-    /// Mean best overlap, and share of regions whose nearest signature is of the most overlapping region.
-    fn likeness(&self, other: &Self) -> [f64; 2] {
-        const PLACES: [usize; 2] = [50, 200];
-        let count = |cut: &Self| cut.cut.signatures.len();
-        let mut common = vec![vec![0.0; count(other)]; count(self)];
-        for i in 0..PLACES[0] * PLACES[1] {
-            let place = [i % PLACES[0], i / PLACES[0]];
-            let place = [0, 1].map(|k| (place[k] as f64 + 0.5) / PLACES[k] as f64);
-            if let (Some(a), Some(b)) = (self.at(place), other.at(place)) {
-                common[a as usize][b as usize] += 1.0;
-            }
-        }
-        let size = |a: usize| common[a].iter().sum::<f64>();
-        let others = |b: usize| common.iter().map(|row| row[b]).sum::<f64>();
-        let overlap = |a: usize, b: usize| common[a][b] / (size(a) + others(b) - common[a][b]);
-        let apart = |a: usize, b: usize| self.cut.signatures[a].distance(&other.cut.signatures[b]);
-        let (mut best, mut nearest) = (0.0, 0.0);
-        for a in 0..count(self) {
-            let regions = || 0..count(other);
-            let like = regions().max_by(|&b, &c| overlap(a, b).total_cmp(&overlap(a, c)));
-            best += size(a) * like.map_or(0.0, |b| overlap(a, b));
-            let near = regions().min_by(|&b, &c| apart(a, b).total_cmp(&apart(a, c)));
-            nearest += f64::from(u8::from(near == like));
-        }
-        [best / (PLACES[0] * PLACES[1]) as f64, nearest / count(self) as f64]
-    }
 }
 
 /// The body of an ant, and a bishop whose head is the ant's tail, smaller and the other way up.

@@ -1,8 +1,5 @@
 //! Clusters that cover a grid.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -140,10 +137,9 @@ pub(super) struct Cover {
     pub(super) epsilon: f64,
 }
 
-/// Covers the open nodes with clusters of radius `epsilon`, seeds in ascending order of their class of `ranks`, see [`class`]. Of
-/// the nodes of a class that no cluster holds yet the farthest from the seeds so far is next, of equals that of lower rank, then the
-/// first in the grid. The very first seed is the node of the lowest class that is farthest from the lowest node. Without
-/// `epsilon`, half of the largest distance from the first seed.
+/// Covers the open nodes with clusters of radius `epsilon`: the first node in ascending order of `ranks` that no cluster
+/// holds yet is the next seed. Of equals the first in the grid; what has no rank comes last. Without `epsilon`, half of the
+/// largest distance from the first seed.
 ///
 /// # Errors
 /// More than [`MOST`] clusters; cancelled.
@@ -157,89 +153,37 @@ pub(super) fn cover(
     let is_open = |&(_, node): &(f64, usize)| field.is_open(node % cols, node / cols);
     let mut order: Vec<_> = ranks.iter().copied().zip(0..).filter(is_open).collect();
     order.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let (sum, count) = order
-        .iter()
-        .filter(|(rank, _)| rank.is_finite())
-        .fold((0.0, 0.0), |(sum, count), (rank, _)| (sum + rank, count + 1.0));
-    let class = |rank: f64| class(rank, sum / count);
-    let classes: Vec<_> = order.chunk_by(|a, b| class(a.0) == class(b.0)).collect();
-    let Some(&lowest) = classes.first() else {
-        return Ok(Cover { seeds: Vec::new(), epsilon: epsilon.unwrap_or(0.0) });
-    };
-
+    let mut seeds = Vec::new();
     let quiet = control.quiet();
-    let mut distances = Distances::new(field, &quiet);
-    distances.add(lowest[0].1, f64::INFINITY)?;
-    let (first, _) = distances.farthest(lowest);
-    let mut distances = Distances::new(field, &quiet);
-    distances.add(first, f64::INFINITY)?;
-    let epsilon = epsilon.unwrap_or_else(|| 0.5 * f64::from(distances.farthest(&order).1));
-    let mut seeds = vec![first];
-    for class in classes {
-        // Positive floats are in the order of their bits. Distances in the heap may have shrunk since.
-        let at = |i: usize| (distances.nearest[class[i].1].to_bits(), Reverse(i));
-        let mut heap: BinaryHeap<_> = (0..class.len()).map(at).collect();
-        while let Some((known, Reverse(i))) = heap.pop() {
-            let node = class[i].1;
-            let now = distances.nearest[node];
-            if f64::from(now) <= epsilon {
-                continue;
-            }
-            if now.to_bits() < known {
-                heap.push((now.to_bits(), Reverse(i)));
-                continue;
-            }
-            if seeds.len() == MOST {
-                return Err(Error::usage(format!(
-                    "clusters of radius {epsilon} are too small: {MOST} of them do not cover the surface; choose a larger \
-                     epsilon"
-                )));
-            }
-            // Beyond that it is nearest to no node of the class. To nodes of later classes distances are then no less than the true ones.
-            distances.add(node, f64::from(now))?;
-            seeds.push(node);
-            control.report("covering", epsilon / f64::from(now));
+    let mut clusters = Clusters { field, reach: REACH, looked_at: 0 };
+    let mut around =
+        |place: usize, epsilon: f64| clusters.around([place % cols, place / cols], epsilon, &quiet);
+    let epsilon = match (epsilon, order.first()) {
+        (Some(epsilon), _) => epsilon,
+        (None, Some(&(_, first))) => {
+            let all = around(first, f64::INFINITY)?;
+            0.5 * f64::from(all.iter().fold(0f32, |most, &(_, value)| most.max(value)))
         }
+        (None, None) => 0.0,
+    };
+    let mut is_held = vec![false; ranks.len()];
+    for (done, &(_, seed)) in order.iter().enumerate() {
+        if is_held[seed] {
+            continue;
+        }
+        if seeds.len() == MOST {
+            return Err(Error::usage(format!(
+                "clusters of radius {epsilon} are too small: {MOST} of them do not cover the surface; choose a larger \
+                 epsilon"
+            )));
+        }
+        control.report("covering", done as f64 / order.len() as f64);
+        around(seed, epsilon)?.iter().for_each(|&(place, _)| is_held[place] = true);
+        // Where the metric is too extreme to seed a node, its cluster is empty.
+        is_held[seed] = true;
+        seeds.push(seed);
     }
     Ok(Cover { seeds, epsilon })
-}
-
-/// The class of a rank: ranks within a tenth of their mean count as equal. What differs by less is decided by the sampling, and
-/// surfaces of like shape would be cut at different places. What has no rank is in a class of its own, the last.
-fn class(rank: f64, mean: f64) -> u64 {
-    if rank.is_finite() { (rank / (0.1 * mean)) as u64 } else { u64::MAX }
-}
-
-/// The distance of each node to the nearest seed so far.
-struct Distances<'a> {
-    clusters: Clusters<'a>,
-    control: &'a Control,
-    nearest: Vec<f32>,
-}
-
-impl<'a> Distances<'a> {
-    fn new(field: &'a TensorField, control: &'a Control) -> Self {
-        let clusters = Clusters { field, reach: REACH, looked_at: 0 };
-        Self { clusters, control, nearest: vec![f32::INFINITY; field.cols() * field.rows()] }
-    }
-
-    /// Adds a seed, to be known as far as `reach`.
-    fn add(&mut self, seed: usize, reach: f64) -> Result<()> {
-        let cols = self.clusters.field.cols();
-        for (node, g) in self.clusters.around([seed % cols, seed / cols], reach, self.control)? {
-            self.nearest[node] = self.nearest[node].min(g);
-        }
-        // Where the metric is too extreme to seed a node, its cluster is empty.
-        self.nearest[seed] = 0.0;
-        Ok(())
-    }
-
-    /// The farthest of some nodes that can be reached, of equals the first, and its distance.
-    fn farthest(&self, nodes: &[(f64, usize)]) -> (usize, f32) {
-        let distances = nodes.iter().map(|&(_, node)| (node, self.nearest[node]));
-        let reached = distances.filter(|(_, g)| g.is_finite());
-        reached.fold((nodes[0].1, 0.0), |most, next| if next.1 > most.1 { next } else { most })
-    }
 }
 
 /// Grid coordinates of a place in the row-major grid.
