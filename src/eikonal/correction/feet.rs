@@ -225,7 +225,7 @@ struct Line {
 }
 
 /// Finds the feet of a row of a tile from those of the round before. Where one is in another triangle now, which is seldom, the row is
-/// done without them, and with two steps: with one, the error near the pole of a sphere does not fall.
+/// done without them, and with two steps: with one, the error near the pole of a sphere falls with order 0.9 instead of 1.3.
 #[inline(always)]
 fn find_line_again<const IN_CONE: bool>(
     around: &Surroundings,
