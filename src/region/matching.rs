@@ -21,7 +21,7 @@ pub struct Match {
 }
 
 /// Matches regions of two surfaces: the two most alike first, then the two most alike of the others, until one surface
-/// has none left. With `sized`, size counts beside shape.
+/// has none left. With `sized`, size counts beside shape. Regions in which nothing varies, such as those of one node, are left out.
 ///
 /// # Cost
 /// Some 50 ns and 24 bytes for each pair.
@@ -65,8 +65,9 @@ fn greedy(
         let (a, b) = (&first[i], &second[j]);
         if sized { a.sized_distance(b) } else { a.distance(b) }
     };
-    // A region without nodes is like none.
-    let pairs = pairs.filter(|&(i, j)| first[i].size > 0.0 && second[j].size > 0.0);
+    // In a region of one node, or of none, nothing varies: it is like none.
+    let varies = |signature: &Signature| signature.eigenvalues[0] > 0.0;
+    let pairs = pairs.filter(|&(i, j)| varies(&first[i]) && varies(&second[j]));
     let mut pairs: Vec<_> = pairs.map(|(i, j)| (unlike(i, j), i, j)).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut state = vec![Region::default(); first.len() + second.len()];
@@ -102,6 +103,14 @@ mod tests {
     fn regions(numbers: &[f64]) -> Vec<Signature> {
         let of = |&x: &f64| Signature { eigenvalues: [x * x, x, 0.0, 0.0], size: x };
         numbers.iter().map(of).collect()
+    }
+
+    #[test]
+    fn regions_of_one_node_are_like_none() {
+        let mut regions = regions(&[1.0, 2.0, 3.0, 4.0]);
+        regions[1].eigenvalues = [0.0; 4];
+        regions[2].eigenvalues = [0.0; 4];
+        assert_eq!(pairs(&matches_within(&regions, false).unwrap()), [(0, 3, true)]);
     }
 
     fn pairs(found: &[Match]) -> Vec<(usize, usize, bool)> {
