@@ -3,19 +3,21 @@
 //! Prints, for walls of 50 nodes across the way east from the start, the time of an update and of a solve from the
 //! beginning, and how many tiles each solved.
 //!
-//! `cargo run --release --example edit_barriers [nodes along a side [repetitions]]`
+//! `cargo run --release --example edit_barriers [nodes along a side [repetitions [fast|high]]]`
 
 use std::time::Instant;
 
 use ridgeway::eikonal::TensorField;
-use ridgeway::{Control, DistanceMap, Error, Solver, Stop, Sym2};
+use ridgeway::{Accuracy, Control, DistanceMap, Error, Solver, Stop, Sym2};
 
 const WALL: usize = 50;
 
 fn main() -> Result<(), Error> {
     let number = |place: usize| std::env::args().nth(place).and_then(|text| text.parse().ok());
     let (n, repetitions) = (number(1).unwrap_or(501), number(2).unwrap_or(1));
-    let (solver, control) = (Solver::default(), Control::default());
+    let is_high = std::env::args().nth(3).is_some_and(|accuracy| accuracy == "high");
+    let accuracy = if is_high { Accuracy::High } else { Accuracy::Fast };
+    let (solver, control) = (Solver { accuracy, ..Solver::default() }, Control::default());
     let middle = n / 2;
     let start = [glam::DVec2::splat(middle as f64).into()];
     // Ground whose fast direction turns, three times as fast along as across.

@@ -20,9 +20,8 @@ impl Solver {
     /// The outcome is that of a solve from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was done.
     ///
     /// Costs the sampling of the metric and a comparison of all tensors; [`update_nodes`](Self::update_nodes) costs
-    /// neither. All is solved again if `map` is of [`Accuracy::High`](super::Accuracy), whose values say nothing of what they came from, or
-    /// where the ground around a start changed so that another cone fans out from it, or next to a start that
-    /// another way passes over.
+    /// neither. All is solved again where the ground around a start changed so that another cone fans out from it, or next to a
+    /// start that another way passes over.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -96,10 +95,11 @@ impl Solver {
         let mut changed = edit(&mut map.field)?;
         let seeds = source::seeds(&map.field, &map.starts)?;
         changed.extend(moved_seeds(&before, &seeds));
-        if map.errors.is_some() || Cones::new(&map.field, &map.starts) != map.cones {
+        if Cones::new(&map.field, &map.starts) != map.cones {
             return self.solve_again(map, stop, control);
         }
         let contested = contested(&map.values, &before);
+        let uncorrected = map.to_correct();
         let lost = clear(&mut map, &changed);
         let equation = Equation {
             field: &map.field,
@@ -120,6 +120,9 @@ impl Solver {
             return self.solve_again(map, stop, control);
         }
         let map = self.go_on(map, &lost, &seeds, stop, control)?;
+        let mut differing = map.differing(uncorrected);
+        changed.iter().for_each(|&(tile, _)| differing[tile] = true);
+        let map = self.correct(map, &seeds, &differing, control)?;
         let statistics = Statistics {
             activations: forgetting.activations + map.statistics.activations,
             sweeps: forgetting.sweeps + map.statistics.sweeps,

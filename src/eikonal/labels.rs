@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::update::RING;
-use super::{DistanceMap, SLACK, best_foot, source};
+use super::{DistanceMap, SLACK, source};
 
 /// Not looked at yet.
 const UNKNOWN: u32 = u32::MAX;
@@ -84,7 +84,7 @@ impl DistanceMap {
         if !self.is_reached(col, row) {
             return None;
         }
-        let (_, foot) = best_foot(&self.field, &self.cones, &self.values, col, row)?;
+        let (_, foot) = self.best_foot(col, row)?;
         let near = foot.round();
         // The foot lies between it and the end beyond.
         let far = near + (foot - near).signum() * (foot - near).abs().ceil();

@@ -4,7 +4,7 @@
 //! (`update.rs`) and iterates it to a standstill tile by tile in order of distance (`tiles.rs`). First order
 //! in the spacing, also near the start, where the cone of a point is taken out (`cone.rs`); second order by deferred
 //! correction if asked for ([`Accuracy`], `correction/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
-//! ns of one core and 16 bytes per node, at high accuracy 90 to 160 ns and 20 bytes. [`mod@reference`] is the slow
+//! ns of one core and 16 bytes per node, at high accuracy 90 to 160 ns and 24 bytes. [`mod@reference`] is the slow
 //! judge; `docs/solver.md` has the measurements.
 
 mod board;
@@ -22,8 +22,10 @@ mod tiles;
 mod update;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use self::cone::{Cone, Cones};
+use self::correction::{Correction, FirstOrder};
 pub use self::field::TensorField;
 use self::field::{AREA, TensorTile};
 use self::source::Seeds;
@@ -107,37 +109,41 @@ impl Solver {
             cones = Cones::default();
             solution = solve(&cones)?;
         }
-        let Solution { mut values, limits, statistics } = solution.ok_or_else(|| {
+        let Solution { values, limits, statistics } = solution.ok_or_else(|| {
             Error::usage("the distance does not settle on this metric; its tensors are too extreme")
         })?;
         control.report("solving distance", 1.0);
-        let errors = self.correct(&field, &cones, &mut values, &seeds, control)?;
-        Ok(DistanceMap {
-            errors,
+        let map = DistanceMap {
             field,
             cones,
             values,
+            correction: None,
             limits,
             starts: starts.into(),
             statistics,
             unit: "",
             frame: None,
-        })
+        };
+        self.correct(map, &seeds, &[], control)
     }
 
-    /// Brings values to second order if that is asked for; estimates of their errors.
+    /// Brings first-order values to second order, if that is asked for; if they have a correction, only where tiles `changed`.
     fn correct(
         &self,
-        field: &TensorField,
-        cones: &Cones,
-        values: &mut Values,
+        mut map: DistanceMap,
         seeds: &[Option<Box<Seeds>>],
+        changed: &[bool],
         control: &Control,
-    ) -> Result<Option<Vec<[f32; AREA]>>> {
-        if self.accuracy == Accuracy::Fast {
-            return Ok(None);
-        }
-        correction::correct(field, cones, &mut values.tiles, seeds, control).map(Some)
+    ) -> Result<DistanceMap> {
+        let before = map.correction.take();
+        let DistanceMap { field, cones, values, .. } = &map;
+        let solution = FirstOrder { field, cones, values, seeds };
+        map.correction = match (self.accuracy, before) {
+            (Accuracy::Fast, _) => None,
+            (Accuracy::High, None) => Some(Correction::new(&solution, control)?),
+            (Accuracy::High, Some(before)) => Some(before.update(&solution, changed, control)?),
+        };
+        Ok(map)
     }
 
     /// Goes on with a map that a [`Stop`] ended, without solving again what is final. The outcome is that of a solve
@@ -148,10 +154,13 @@ impl Solver {
     pub fn resume(&self, map: DistanceMap, stop: &Stop, control: &Control) -> Result<DistanceMap> {
         stop.check()?;
         let seeds = source::seeds(&map.field, &map.starts)?;
-        self.go_on(map, &[], &seeds, stop, control)
+        let before = map.to_correct();
+        let map = self.go_on(map, &[], &seeds, stop, control)?;
+        let changed = map.differing(before);
+        self.correct(map, &seeds, &changed, control)
     }
 
-    /// Solves from the nodes that are unreached in `map` and around the `edited` ones, see [`News::Since`].
+    /// Solves, to first order, from the nodes that are unreached in `map` and around the `edited` ones, see [`News::Since`].
     fn go_on(
         &self,
         map: DistanceMap,
@@ -166,9 +175,8 @@ impl Solver {
         let equation = Equation { field, cones, seeds, tolerance: self.tolerance };
         let news = News::Since { before, edited };
         match tiles::solve(&equation, values, limits.clone(), news, stop, control)? {
-            Some(Solution { mut values, limits, statistics }) => {
-                let errors = self.correct(field, cones, &mut values, seeds, control)?;
-                Ok(DistanceMap { values, limits, errors, statistics, ..map })
+            Some(Solution { values, limits, statistics }) => {
+                Ok(DistanceMap { values, limits, statistics, ..map })
             }
             None => self.solve_again(map, stop, control),
         }
@@ -186,11 +194,12 @@ impl Solver {
 pub struct DistanceMap {
     pub(crate) field: TensorField,
     cones: Cones,
+    /// First order.
     values: Values,
+    /// What is to be added to them, in high accuracy.
+    correction: Option<Correction>,
     /// What is known of each tile, for going on.
     limits: Vec<Limits>,
-    /// Estimates of the error, in high accuracy.
-    errors: Option<Vec<[f32; AREA]>>,
     starts: Box<[StartRegion]>,
     statistics: Statistics,
     unit: &'static str,
@@ -222,17 +231,17 @@ impl DistanceMap {
         self.statistics
     }
 
-    /// Memory that the map takes per node: tensors, values and, in high accuracy, estimates of the error.
+    /// Memory that the map takes per node: tensors, values and, in high accuracy, two rounds of corrections.
     #[must_use]
     pub fn bytes_per_node(&self) -> usize {
-        let errors = if self.errors.is_some() { size_of::<[f32; AREA]>() } else { 0 };
-        (size_of::<TensorTile>() + size_of::<[f32; AREA]>() + errors) / AREA
+        let numbers = if self.correction.is_some() { 3 } else { 1 };
+        size_of::<TensorTile>() / AREA + numbers * size_of::<f32>()
     }
 
     /// Distance at a node; infinite where not reached.
     #[must_use]
     pub fn at_node(&self, col: usize, row: usize) -> f64 {
-        let value = self.values.get(col, row);
+        let value = self.value(col, row);
         if value < UNREACHED { f64::from(value) / self.field.root_scale() } else { f64::INFINITY }
     }
 
@@ -241,8 +250,8 @@ impl DistanceMap {
     #[must_use]
     pub fn error_at_node(&self, col: usize, row: usize) -> Option<f64> {
         let (tile, place) = self.field.tiling.place(col, row);
-        let error = f64::from(self.errors.as_ref()?[tile][place]) / self.field.root_scale();
-        self.is_reached(col, row).then_some(error)
+        let error = self.correction.as_ref()?.error_left(tile, place, self.value(col, row));
+        self.is_reached(col, row).then_some(f64::from(error) / self.field.root_scale())
     }
 
     /// Distances at all nodes, row-major from the north-west, infinite where not reached.
@@ -306,8 +315,27 @@ impl DistanceMap {
         (DVec2::new(-foot.x, foot.y) * spacing).try_normalize()
     }
 
+    /// The values, if they have a correction that must follow when they change.
+    fn to_correct(&self) -> Option<Values> {
+        self.correction.is_some().then(|| self.values.clone())
+    }
+
+    /// Which tiles have other values than before; none, if there is nothing to correct.
+    fn differing(&self, before: Option<Values>) -> Vec<bool> {
+        let Some(before) = before else { return vec![false; self.values.tiles.len()] };
+        let pairs = before.tiles.par_iter().zip(&self.values.tiles);
+        pairs.map(|(before, after)| before != after).collect()
+    }
+
+    /// Value at a node in the field's stored units, corrected.
+    fn value(&self, col: usize, row: usize) -> f32 {
+        let (tile, place) = self.field.tiling.place(col, row);
+        let correction = self.correction.as_ref().map_or(0.0, |all| all.at(tile, place));
+        self.values.tiles[tile][place] + correction
+    }
+
     pub(crate) fn stored(&self, col: usize, row: usize) -> f64 {
-        f64::from(self.values.get(col, row))
+        f64::from(self.value(col, row))
     }
 
     pub(crate) fn is_reached(&self, col: usize, row: usize) -> bool {
@@ -329,7 +357,11 @@ impl DistanceMap {
         if let Some(foot) = self.straight_home(node, value) {
             return Some(foot - node);
         }
-        best_foot(&self.field, &self.cones, &self.values, col, row).map(|(_, foot)| foot)
+        self.best_foot(col, row).map(|(_, foot)| foot)
+    }
+
+    fn best_foot(&self, col: usize, row: usize) -> Option<(f64, DVec2)> {
+        best_foot(&self.field, &self.cones, |c, r| self.value(c, r), col, row)
     }
 
     /// The point of the start region to go to straight from `at`, if that is the shortest way.
@@ -448,14 +480,14 @@ const SEED_SIGHT: f64 = 4.0;
 fn best_foot(
     field: &TensorField,
     cones: &Cones,
-    values: &Values,
+    value: impl Fn(usize, usize) -> f32,
     col: usize,
     row: usize,
 ) -> Option<(f64, DVec2)> {
     let metric = field.metric(col, row)?;
     let ring = RING.map(|(i, j)| {
         let node = field.tiling.node(col as isize + i as isize, row as isize + j as isize);
-        node.map_or(f32::INFINITY, |(c, r)| values.get(c, r))
+        node.map_or(f32::INFINITY, |(c, r)| value(c, r))
     });
     let shifts = cones.shifts(field, col, row);
     let mut best: Option<(f64, DVec2)> = None;

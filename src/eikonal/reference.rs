@@ -33,7 +33,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
             for i in 0..cols {
                 let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
                 let old = values.get(col, row);
-                let new = best_foot(&field, &cones, &values, col, row)
+                let new = best_foot(&field, &cones, |c, r| values.get(c, r), col, row)
                     .map_or(f32::INFINITY, |(g, _)| g as f32);
                 let (tile, place) = field.tiling.place(col, row);
                 let seed = seeds[tile].as_ref().map_or(f32::INFINITY, |seeds| seeds[place]);
@@ -57,7 +57,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
         cones,
         values,
         limits,
-        errors: None,
+        correction: None,
         starts: starts.into(),
         statistics,
         unit: "",

@@ -4,10 +4,9 @@
 
 use multiversion::multiversion;
 
-use super::super::cone::Cones;
-use super::super::field::{AREA, SIDE, TensorField};
-use super::super::source::Seeds;
+use super::super::field::{AREA, SIDE};
 use super::super::update::{How, Limits, RING, Tile, UNREACHED, choose, lanes, prepare_shifts};
+use super::FirstOrder;
 use super::functional::{ConeAt, Foot};
 use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
 use super::triangle::Triangle;
@@ -35,12 +34,9 @@ pub(super) const BEHIND: u32 = 4;
 
 /// What the feet of a tile are made from.
 pub(super) struct Input<'a> {
-    pub(super) field: &'a TensorField,
-    pub(super) cones: &'a Cones,
-    pub(super) values: &'a [[f32; AREA]],
+    pub(super) solution: &'a FirstOrder<'a>,
     /// Corrections of the rounds before; none in the first.
     pub(super) total: Option<&'a [[f32; AREA]]>,
-    pub(super) seeds: &'a [Option<Box<Seeds>>],
 }
 
 /// What surrounds tiles side by side.
@@ -68,18 +64,19 @@ impl Surroundings {
         feet: &mut [Feet],
         reads: &mut [u8],
     ) {
-        let field = input.field;
+        let &FirstOrder { field, cones, values, seeds } = input.solution;
         let tiling = &field.tiling;
-        let reached = |tile: usize| input.values[tile].iter().any(|&g| g < UNREACHED);
+        let reached = |tile: usize| values.tiles[tile].iter().any(|&g| g < UNREACHED);
         let tiles = feet.len();
         if !(first..first + tiles).any(reached) {
             feet.fill(Feet::NONE);
             return reads.fill(0);
         }
         let part = (first, tiles);
-        fill(&mut self.g, tiling, part, f32::INFINITY, |t| &input.values[t]);
-        if let Some(total) = input.total {
-            fill(&mut self.e, tiling, part, 0.0, |t| &total[t]);
+        fill(&mut self.g, tiling, part, f32::INFINITY, |t| &values.tiles[t]);
+        match input.total {
+            Some(total) => fill(&mut self.e, tiling, part, 0.0, |t| &total[t]),
+            None => self.e.as_flattened_mut().fill(0.0),
         }
         let [xx, xy, det, _] = &mut self.metric;
         fill(xx, tiling, part, 0.0, |t| &field.tiles[t].xx);
@@ -89,8 +86,8 @@ impl Surroundings {
         for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {
             let tile = first + k;
             let size = tiling.size(tile);
-            let cone = input.cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
-            let seeds = input.seeds[tile].as_deref();
+            let cone = cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
+            let seeds = seeds[tile].as_deref();
             let tile = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
             *reads = find(self, k * SIDE, &tile, size, input.total.is_some(), feet);
         }

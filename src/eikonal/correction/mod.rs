@@ -22,19 +22,19 @@
 
 mod feet;
 mod functional;
+mod patch;
 mod strip;
 mod transport;
 mod triangle;
 
 use rayon::prelude::*;
 
-use self::feet::{Feet, Input, Surroundings};
-use self::strip::STRIP;
-use self::transport::Ways;
+use self::patch::Patch;
 use super::cone::Cones;
-use super::field::{AREA, SIDE, TensorField};
+use super::field::{AREA, TensorField};
 use super::source::Seeds;
-use super::update::{ROUNDING, UNREACHED, least};
+use super::tiles::Values;
+use super::update::{ROUNDING, UNREACHED};
 use crate::{Control, Result};
 
 /// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first
@@ -42,66 +42,93 @@ use crate::{Control, Result};
 /// second gained up to a factor of 6 at ratios of 100 and more, and further ones little.
 const TOLERANCE_CELLS: [f32; 2] = [1e-4, 1e-5];
 
-/// Brings first-order values to second order, nodes of the start excepted; estimates of the errors that are left.
-pub(super) fn correct(
-    field: &TensorField,
-    cones: &Cones,
-    values: &mut [[f32; AREA]],
-    seeds: &[Option<Box<Seeds>>],
-    control: &Control,
-) -> Result<Vec<[f32; AREA]>> {
-    let tiling = field.tiling;
-    let keys: Vec<f32> = values.par_iter().map(least_of).collect();
-    let mut order: Vec<u32> =
-        (0..tiling.tiles() as u32).filter(|&t| keys[t as usize] < UNREACHED).collect();
-    order.sort_unstable_by(|&a, &b| keys[a as usize].total_cmp(&keys[b as usize]).then(a.cmp(&b)));
-    let mut feet = vec![Feet::NONE; tiling.tiles()];
-    let mut reads = vec![0; tiling.tiles()];
-    let mut round = |total: Option<&[[f32; AREA]]>, tolerance: f32| {
-        let input = Input { field, cones, values, total, seeds };
-        let rows = feet.par_chunks_mut(tiling.across).zip(reads.par_chunks_mut(tiling.across));
-        rows.enumerate().try_for_each_init(
-            Surroundings::default,
-            |around, (row, (feet, reads))| {
-                control.check()?;
-                let strips = feet.chunks_mut(STRIP).zip(reads.chunks_mut(STRIP)).enumerate();
-                for (k, (feet, reads)) in strips {
-                    around.find(&input, row * tiling.across + k * STRIP, feet, reads);
-                }
-                Ok(())
-            },
-        )?;
-        let ways = Ways { feet: &feet, reads: &reads, keys: &keys, order: &order };
-        transport::carry(field, &ways, tolerance * field.mean_step, control)
-    };
-    control.report("correcting distance", 0.0);
-    let first = round(None, TOLERANCE_CELLS[0])?;
-    control.report("correcting distance", 0.5);
-    let mut second = round(Some(&first), TOLERANCE_CELLS[1])?;
-    control.report("correcting distance", 1.0);
-    values.par_iter_mut().zip(&first).zip(&mut second).for_each(|((values, first), second)| {
-        for i in 0..AREA {
-            let total = first[i] + second[i];
-            (values[i], second[i]) = (values[i] + total, error_left(values[i], total, second[i]));
-        }
-    });
-    Ok(second)
+/// The first-order solution that is to be corrected.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FirstOrder<'a> {
+    pub(super) field: &'a TensorField,
+    pub(super) cones: &'a Cones,
+    pub(super) values: &'a Values,
+    pub(super) seeds: &'a [Option<Box<Seeds>>],
 }
 
-/// The least value of a tile.
-fn least_of(tile: &[f32; AREA]) -> f32 {
-    let mut lowest = [f32::INFINITY; SIDE];
-    for row in tile.as_chunks::<SIDE>().0 {
-        for i in 0..SIDE {
-            lowest[i] = least(row[i], lowest[i]);
-        }
+/// What brings first-order values to second order; zero at nodes of the start.
+#[derive(Clone, Debug)]
+pub(super) struct Correction {
+    total: Vec<[f32; AREA]>,
+    /// What the first round brought.
+    first: Vec<[f32; AREA]>,
+}
+
+impl Correction {
+    pub(super) fn new(solution: &FirstOrder<'_>, control: &Control) -> Result<Self> {
+        let tiles = solution.values.tiles.len();
+        let nothing = || vec![[0.0; AREA]; tiles];
+        let patch = Patch::around(solution, &vec![true; tiles]);
+        Self::in_two_rounds(patch, nothing(), nothing(), control)
     }
-    lowest.into_iter().fold(f32::INFINITY, f32::min)
+
+    /// The correction after an edit in these tiles, from that before. What is not downstream of them stays.
+    pub(super) fn update(
+        self,
+        solution: &FirstOrder<'_>,
+        changed: &[bool],
+        control: &Control,
+    ) -> Result<Self> {
+        let Self { total: mut second, mut first } = self;
+        let rounds = second.par_iter_mut().zip(&mut first);
+        rounds.enumerate().for_each(|(tile, (second, first))| {
+            for i in 0..AREA {
+                second[i] -= first[i];
+            }
+            if changed[tile] {
+                for i in solution.fixed(tile) {
+                    (first[i], second[i]) = (0.0, 0.0);
+                }
+            }
+        });
+        Self::in_two_rounds(Patch::around(solution, changed), first, second, control)
+    }
+
+    /// Corrects the patch, and what the correction is carried to, from what the rounds brought before.
+    fn in_two_rounds(
+        mut patch: Patch<'_>,
+        first: Vec<[f32; AREA]>,
+        second: Vec<[f32; AREA]>,
+        control: &Control,
+    ) -> Result<Self> {
+        control.report("correcting distance", 0.0);
+        let first = patch.round(first, None, TOLERANCE_CELLS[0], control)?;
+        control.report("correcting distance", 0.5);
+        patch.widen();
+        let mut total = patch.round(second, Some(&first), TOLERANCE_CELLS[1], control)?;
+        control.report("correcting distance", 1.0);
+        total.par_iter_mut().zip(&first).for_each(|(total, first)| {
+            for i in 0..AREA {
+                total[i] += first[i];
+            }
+        });
+        Ok(Self { total, first })
+    }
+
+    /// How much is to be added to the value at a place of a tile.
+    pub(super) fn at(&self, tile: usize, place: usize) -> f32 {
+        self.total[tile][place]
+    }
+
+    /// What may be wrong with a corrected value: the last round's change, the share of the correction that is typically
+    /// left after it, and rounding.
+    pub(super) fn error_left(&self, tile: usize, place: usize, value: f32) -> f32 {
+        const SHARE_LEFT: f32 = 0.1;
+        let (total, first) = (self.total[tile][place], self.first[tile][place]);
+        (total - first).abs() + SHARE_LEFT * total.abs() + ROUNDING * value
+    }
 }
 
-/// What may be wrong with a corrected value: the last round's change, the share of the correction that is typically
-/// left after it, and rounding.
-fn error_left(value: f32, total: f32, last: f32) -> f32 {
-    const SHARE_LEFT: f32 = 0.1;
-    last.abs() + SHARE_LEFT * total.abs() + ROUNDING * value
+impl FirstOrder<'_> {
+    /// The places of a tile that have nothing to correct: the start, and what is closed or not reached.
+    fn fixed(&self, tile: usize) -> impl Iterator<Item = usize> {
+        let (values, seeds) = (&self.values.tiles[tile], self.seeds[tile].as_deref());
+        let is_start = move |i: usize| seeds.is_some_and(|seeds| seeds[i] < UNREACHED);
+        (0..AREA).filter(move |&i| values[i] >= UNREACHED || is_start(i))
+    }
 }

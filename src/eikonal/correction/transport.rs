@@ -6,10 +6,11 @@ use multiversion::multiversion;
 
 use super::super::board::Board;
 use super::super::crew;
-use super::super::field::{AREA, SIDE, TensorField, Tiling};
+use super::super::field::{AREA, SIDE, Tiling};
 use super::super::tiles::{ITSELF, Job, Queue, Values, WINDOW_CELLS, neighbours, opposite};
 use super::super::update::{ALL, Block, Lines, choose, lanes};
 use super::feet::{self, BEFORE, BEHIND, Feet};
+use super::patch::Patch;
 use super::triangle::Triangle;
 use crate::{Control, Result};
 
@@ -31,33 +32,31 @@ struct Outcome {
     changed: u8,
 }
 
-/// The feet of a field's tiles: what the transport follows.
-pub(super) struct Ways<'a> {
-    pub(super) feet: &'a [Feet],
-    /// Neighbours that each tile reads, one bit each as in [`RING`](super::super::update::RING).
-    pub(super) reads: &'a [u8],
-    /// Least distance of each tile, and the tiles in order of it.
-    pub(super) keys: &'a [f32],
-    pub(super) order: &'a [u32],
-}
-
-/// Solves `e = (1−θ) e(a) + θ e(b) + ρ`, tiles in the order of their least distance.
+/// Solves `e = (1−θ) e(a) + θ e(b) + ρ` in a patch, tiles in the given `order`, that of their least distance; also the tiles
+/// beyond the patch beside which `e` changed.
 pub(super) fn carry(
-    field: &TensorField,
-    &Ways { feet, reads, keys, order }: &Ways<'_>,
+    patch: &Patch<'_>,
+    order: &[u32],
+    e: Vec<[f32; AREA]>,
     tolerance: f32,
     control: &Control,
-) -> Result<Vec<[f32; AREA]>> {
-    let tiling = field.tiling;
+) -> Result<(Vec<[f32; AREA]>, Vec<usize>)> {
+    let Patch { solution, keys, .. } = patch;
+    let tiling = solution.field.tiling;
     let tiles = tiling.tiles();
+    let window = WINDOW_CELLS * solution.field.mean_step;
     let mut order = order.iter().copied().peekable();
+    let mut beyond = Vec::new();
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
-    let e = Board::new(Values { tiling, tiles: vec![[0.0; AREA]; tiles] });
+    let e = Board::new(Values { tiling, tiles: e });
     let shared = Shared { e, queue: Queue::new(tiles), taken: Vec::new() };
     let work = |_: &mut (), shared: &Shared, index: usize| {
         let tile = shared.taken[index].tile as usize;
-        carry_tile(&tiling, &feet[tile], &shared.e, tile, tolerance)
+        match patch.feet(tile) {
+            Some((feet, _)) => carry_tile(&tiling, feet, &shared.e, tile, tolerance),
+            None => Outcome { settled: true, changed: 0 },
+        }
     };
     let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| {
         control.check()?;
@@ -74,14 +73,19 @@ pub(super) fn carry(
                 wake(tile);
             }
             for (side, n) in neighbours(&tiling, tile) {
-                if outcome.changed & 1 << side != 0 && reads[n] & 1 << opposite(side) != 0 {
-                    wake(n);
+                if outcome.changed & 1 << side == 0 {
+                    continue;
+                }
+                match patch.feet(n) {
+                    Some((_, reads)) if reads & 1 << opposite(side) != 0 => wake(n),
+                    Some(_) => {}
+                    None => beyond.push(n),
                 }
             }
         }
         taken.clear();
         let next = order.peek().map_or(f32::INFINITY, |&tile| keys[tile as usize]);
-        let limit = queue.least_key().min(next) + WINDOW_CELLS * field.mean_step;
+        let limit = queue.least_key().min(next) + window;
         while let Some(tile) = order.next_if(|&tile| keys[tile as usize] <= limit) {
             queue.wake(tile as usize, keys[tile as usize], ITSELF);
         }
@@ -91,7 +95,8 @@ pub(super) fn carry(
         }
         Ok(taken.len())
     };
-    Ok(crew::run(shared, lead, work)?.e.into_values().tiles)
+    let e = crew::run(shared, lead, work)?.e.into_values().tiles;
+    Ok((e, beyond))
 }
 
 /// Sweeps the correction through a tile until it stands still.

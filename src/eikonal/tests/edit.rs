@@ -4,14 +4,16 @@ use super::*;
 
 type Edits = Vec<(usize, usize, Option<Sym2>)>;
 
-/// The largest relative difference between an update and a solve from the beginning; infinite if one reaches what
-/// the other does not.
+/// The largest relative difference between an update and a solve from the beginning, beyond the errors that both admit in high
+/// accuracy; infinite if one reaches what the other does not.
 fn difference(update: &DistanceMap, fresh: &DistanceMap) -> f64 {
-    let worst = |(a, b): (f32, f32)| {
-        if a == b { 0.0 } else { f64::from((a - b).abs()) / f64::from(b) }
+    let difference = |(col, row): (usize, usize)| {
+        let (a, b) = (update.at_node(col, row), fresh.at_node(col, row));
+        let error = |map: &DistanceMap| map.error_at_node(col, row).unwrap_or(0.0);
+        if a == b { 0.0 } else { ((a - b).abs() - error(update) - error(fresh)) / b }
     };
-    let pairs = update.to_row_major().into_iter().zip(fresh.to_row_major());
-    pairs.map(worst).map(|d| if d.is_nan() { f64::INFINITY } else { d }).fold(0.0, f64::max)
+    let nodes = (0..fresh.rows()).flat_map(|row| (0..fresh.cols()).map(move |col| (col, row)));
+    nodes.map(difference).map(|d| if d.is_nan() { f64::INFINITY } else { d }).fold(0.0, f64::max)
 }
 
 /// The map of a field with some nodes edited, updated and from the beginning.
@@ -84,12 +86,13 @@ proptest! {
         (x, y) in (0.0..59.0f64, 0.0..49.0f64),
         (other, value) in (0.0..49.0f64, 0.0..20.0f64),
         exact in any::<bool>(),
+        accuracy in prop_oneof![Just(Accuracy::Fast), Just(Accuracy::High)],
         stop in prop_oneof![3 => Just(Stop::Never), 1 => (0.0..40.0f64).prop_map(Stop::Distance)],
     ) {
         let second = StartRegion::from(DVec2::new(other, x.min(49.0))).with_value(value);
         let starts = [StartRegion::from(DVec2::new(x, y)), second];
         let tolerance = if exact { 0.0 } else { Solver::default().tolerance };
-        let solver = Solver { tolerance, ..Solver::default() };
+        let solver = Solver { tolerance, accuracy };
         if let Some([update, fresh]) = both(&solver, &f, &starts, &edits, &stop) {
             let bound = if exact { 1e-5 } else { 1e-3 };
             let difference = difference(&update, &fresh);
@@ -198,13 +201,31 @@ fn whole_fields_are_compared_and_other_shapes_solved() {
 }
 
 #[test]
-fn high_accuracy_survives_an_edit() {
+fn a_correction_follows_an_edit_and_going_on() {
     let solver = Solver { accuracy: Accuracy::High, ..Solver::default() };
-    let start = [DVec2::new(30.0, 60.0).into()];
-    let [update, fresh] =
-        both(&solver, &turning(120), &start, &wall((70, 20), (0, 1), 60), &Stop::Never).unwrap();
-    assert_eq!(update.values.tiles, fresh.values.tiles);
-    assert!(update.error_at_node(100, 50).is_some());
+    let (f, start) = (turning(200), [DVec2::new(30.0, 60.0).into()]);
+    let control = Control::default();
+    let worst = |map: &DistanceMap, other: &DistanceMap| {
+        let pairs = map.to_row_major().into_iter().zip(other.to_row_major());
+        pairs.map(|(a, b)| if a == b { 0.0 } else { (a - b).abs() / b }).fold(0.0, f32::max)
+    };
+    let edits = wall((70, 20), (0, 1), 60);
+    let [update, fresh] = both(&solver, &f, &start, &edits, &Stop::Never).unwrap();
+    assert!(worst(&update, &fresh) < 1e-4, "{:e}", worst(&update, &fresh));
+    let tensor =
+        update.field.metric(90, 100).unwrap().inverse() * update.field.root_scale().powi(2);
+    let same = [(90, 100, Some(tensor))];
+    let again = solver.update_nodes(update.clone(), &same, &Stop::Never, &control).unwrap();
+    assert!(worst(&again, &update) < 3e-6, "{:e}", worst(&again, &update));
+    let whole = solver.solve_field(f.clone(), &start, &Stop::Never, &control).unwrap();
+    let part = solver.solve_field(f.clone(), &start, &Stop::Distance(60.0), &control).unwrap();
+    assert!(!part.is_reached(190, 100));
+    let on = solver.resume(part.clone(), &Stop::Never, &control).unwrap();
+    assert!(worst(&on, &whole) < 1e-5, "{:e}", worst(&on, &whole));
+    // To first order it is no more than that.
+    let fast = Solver::default().resume(part, &Stop::Never, &control).unwrap();
+    let first = solve_from(f, &[(DVec2::new(30.0, 60.0), 0.0)], &Stop::Never);
+    assert!(worst(&fast, &first) < 1e-4 && fast.error_at_node(100, 50).is_none());
 }
 
 #[test]
