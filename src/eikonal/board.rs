@@ -15,13 +15,16 @@ use super::update::Block;
 pub(super) struct Board {
     tiling: Tiling,
     nodes: Vec<AtomicU32>,
+    /// What is read outside the grid.
+    outside: f32,
 }
 
 impl Board {
-    pub(super) fn new(values: Values) -> Self {
+    pub(super) fn new(values: Values, outside: f32) -> Self {
         let nodes = values.tiles.into_flattened();
         Self {
             tiling: values.tiling,
+            outside,
             nodes: nodes.into_iter().map(|value| AtomicU32::new(value.to_bits())).collect(),
         }
     }
@@ -40,29 +43,29 @@ impl Board {
         f32::from_bits(self.tile(tile)[place].load(Relaxed))
     }
 
-    /// A tile and the nodes around it; infinite outside the grid.
+    /// A tile and the nodes around it.
     pub(super) fn load(&self, tile: usize, block: &mut Block) {
         if self.tiling.is_over_seam(tile, 1, 1) {
             return self.load_over_seam(tile, block);
         }
+        let outside = self.outside;
         let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
         for (j, line) in block.iter_mut().enumerate() {
             // Row and column of the block, counted in nodes from the tile before the first.
             let row = ty * SIDE + SIDE + j - 1;
             let (ny, y) = (row / SIDE, row % SIDE);
             if ny == 0 || ny > self.tiling.down {
-                *line = [f32::INFINITY; SIDE + 2];
+                *line = [outside; SIDE + 2];
                 continue;
             }
             let base = (ny - 1) * self.tiling.across;
             let at = |nx: usize, x: usize| self.at(base + nx, y * SIDE + x);
-            line[0] = if tx > 0 { at(tx - 1, SIDE - 1) } else { f32::INFINITY };
+            line[0] = if tx > 0 { at(tx - 1, SIDE - 1) } else { outside };
             let middle = &self.tile(base + tx)[y * SIDE..][..SIDE];
             for (value, bits) in line[1..=SIDE].iter_mut().zip(middle) {
                 *value = f32::from_bits(bits.load(Relaxed));
             }
-            line[SIDE + 1] =
-                if tx + 1 < self.tiling.across { at(tx + 1, 0) } else { f32::INFINITY };
+            line[SIDE + 1] = if tx + 1 < self.tiling.across { at(tx + 1, 0) } else { outside };
         }
     }
 
@@ -71,7 +74,7 @@ impl Board {
         for (row, line) in (-1..).zip(block) {
             for (col, value) in (-1..).zip(line) {
                 let place = self.tiling.seen_from(tile, col, row);
-                *value = place.map_or(f32::INFINITY, |(tile, place)| self.at(tile, place));
+                *value = place.map_or(self.outside, |(tile, place)| self.at(tile, place));
             }
         }
     }
@@ -88,12 +91,12 @@ impl Board {
         }
     }
 
-    /// Closes the places of a tile beyond the grid.
+    /// Puts the places of a tile beyond the grid outside again.
     fn close_beyond(&self, tile: usize) {
         let [cols, rows] = self.tiling.size(tile);
         for (row, line) in self.tile(tile).chunks_exact(SIDE).enumerate() {
             for bits in &line[if row < rows { cols } else { 0 }..] {
-                bits.store(f32::INFINITY.to_bits(), Relaxed);
+                bits.store(self.outside.to_bits(), Relaxed);
             }
         }
     }

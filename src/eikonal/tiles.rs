@@ -290,7 +290,7 @@ pub(super) fn solve(
 ) -> Result<Option<Solution>> {
     let tiling = field.tiling;
     let mut queue = Queue { limits, ..Queue::new(tiling.tiles()) };
-    let board = Board::new(values);
+    let board = Board::new(values, f32::INFINITY);
     let had = match news {
         News::All => {
             wake_start(field, seeds, &mut queue);

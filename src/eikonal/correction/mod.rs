@@ -34,7 +34,7 @@ use super::cone::Cones;
 use super::field::{AREA, TensorField};
 use super::source::Seeds;
 use super::tiles::Values;
-use super::update::{ROUNDING, UNREACHED};
+use super::update::{ROUNDING, UNREACHED, greatest};
 use crate::{Control, Result};
 
 /// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first
@@ -102,9 +102,11 @@ impl Correction {
         patch.widen();
         let mut total = patch.round(second, Some(&first), TOLERANCE_CELLS[1], control)?;
         control.report("correcting distance", 1.0);
-        total.par_iter_mut().zip(&first).for_each(|(total, first)| {
+        let values = &patch.solution.values.tiles;
+        total.par_iter_mut().zip(&first).zip(values).for_each(|((total, first), values)| {
             for i in 0..AREA {
-                total[i] += first[i];
+                // On ground so rough that the transport does not settle no distance is to be negative either.
+                total[i] = greatest(total[i] + first[i], -values[i]);
             }
         });
         Ok(Self { total, first })

@@ -49,7 +49,7 @@ pub(super) fn carry(
     let mut beyond = Vec::new();
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
-    let e = Board::new(Values { tiling, tiles: e });
+    let e = Board::new(Values { tiling, tiles: e }, 0.0);
     let shared = Shared { e, queue: Queue::new(tiles), taken: Vec::new() };
     let work = |_: &mut (), shared: &Shared, index: usize| {
         let tile = shared.taken[index].tile as usize;
@@ -103,10 +103,6 @@ pub(super) fn carry(
 fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
     let mut block = [[0.0; SIDE + 2]; SIDE + 2];
     e.load(tile, &mut block);
-    // Nothing comes from beyond the grid.
-    for value in block.as_flattened_mut() {
-        *value = choose(*value < f32::INFINITY, *value, 0.0);
-    }
     if feet.by_columns {
         transpose(&mut block);
     }
