@@ -307,6 +307,18 @@ fn compare_fills_a_folder_and_repeats_itself() {
 }
 
 #[test]
+fn on_a_plane_the_curvature_route_is_straight() {
+    // Its heights are rounded to four bytes, which bends it a little.
+    let folder = Folder::new();
+    folder.good("synth plane --size 201x151 --spacing 10 -o plane.tif");
+    let places = "plane.tif --start pixel:10,10 --goal pixel:180,120";
+    let told = folder.good(&format!("compare {places} --metrics isotropic,curvature --json -q"));
+    let json: Value = serde_json::from_str(&told).unwrap();
+    let ratio = json["routes"][1]["costs"]["isotropic"]["ratio_to_best"].as_f64().unwrap();
+    assert!(ratio < 1.0 + 1e-6, "{ratio}");
+}
+
+#[test]
 fn render_draws_every_layer_and_routes() {
     let folder = Folder::new();
     for layer in ["hillshade", "height", "slope", "mean", "gaussian"] {
