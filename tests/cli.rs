@@ -125,6 +125,27 @@ fn info_tells_people_and_machines() {
 }
 
 #[test]
+fn maps_that_stretch_the_ground_are_told() {
+    let folder = Folder::new();
+    // Mercator maps double lengths at 60°; those of the web are corrected.
+    folder.write(
+        "x.asc",
+        "ncols 2\nnrows 2\nxllcorner 500000\nyllcorner 8370000\ncellsize 30\n1 1\n1 2\n",
+    );
+    for (code, cell, note) in [
+        (3395, "30 x 30 m", "note: a metre of this map is 0.50 to 0.50 m on the ground"),
+        (3857, "30 x 30 metre (15.", ""),
+        (32632, "30 x 30 m", ""),
+    ] {
+        let prj = format!(r#"PROJCS["x",UNIT["metre",1],AUTHORITY["EPSG","{code}"]]"#);
+        folder.write("x.prj", &prj);
+        let told = folder.run("info x.asc");
+        assert!(told.out.contains(&format!("cell       {cell}")), "{code}: {told:?}");
+        assert!(told.err.starts_with(note) && told.err.is_empty() == note.is_empty(), "{told:?}");
+    }
+}
+
+#[test]
 fn info_announces_the_surface_that_is_fitted() {
     let folder = Folder::new();
     folder.write(

@@ -277,6 +277,23 @@ impl Crs {
         Ok(DVec2::new(wrap_degrees(to.x.to_degrees()), to.y.to_degrees()))
     }
 
+    /// Ground metres in a map metre, eastward and northward, at map coordinates of a plane map; `None` where that is not
+    /// known, and on maps whose [`Ground`] knows.
+    pub(super) fn ground_per_map_metre(&self, map: DVec2) -> Option<DVec2> {
+        /// Map metres, many times what inverse projections are iterated to.
+        const STEP: f64 = 100.0;
+        let Ground::Plane { metres_per_unit } = self.ground else { return None };
+        let (a, b) = self.projection().ok()?.ellipse_parameters();
+        let here = self.to_lonlat(map).ok()?;
+        let ellipsoid = Ground::Ellipsoid { semi_major: a, flattening: (a - b) / a };
+        let metres = |along: DVec2| {
+            let there = self.to_lonlat(map + along * (STEP / metres_per_unit)).ok()?;
+            let by = DVec2::new(wrap_degrees(there.x - here.x), there.y - here.y);
+            Some((by * ellipsoid.metres_per_unit(here.y)).length() / STEP)
+        };
+        Some(DVec2::new(metres(DVec2::X)?, metres(DVec2::Y)?))
+    }
+
     fn projection(&self) -> Result<&Proj> {
         match &self.projection {
             Some(projection) => Ok(&projection.proj),
@@ -414,6 +431,20 @@ mod tests {
         let bng = Crs::from_epsg(27700).unwrap();
         let place = bng.to_lonlat(DVec2::new(577_274.99, 69_740.50)).unwrap();
         assert_near(place, DVec2::new(0.5, 50.5), 2e-3);
+    }
+
+    #[test]
+    fn maps_stretch_the_ground() {
+        let size = |code: u32, map: DVec2| Crs::from_epsg(code).unwrap().ground_per_map_metre(map);
+        // The scale of UTM on its central meridian is 0.9996.
+        let utm = size(32631, DVec2::new(500_000.0, 5e6)).unwrap();
+        assert_near(utm, DVec2::splat(1.0 / 0.9996), 1e-5);
+        // That of Mercator is 1 on the equator and about 2 at 60°.
+        assert_near(size(3395, DVec2::new(1e7, 0.0)).unwrap(), DVec2::ONE, 1e-4);
+        assert_near(size(3395, DVec2::new(1e7, 8.37e6)).unwrap(), DVec2::splat(0.5), 2e-3);
+        // Feet; where the ground knows.
+        assert_near(size(2225, DVec2::new(6.5e6, 2.0e6)).unwrap(), DVec2::ONE, 2e-4);
+        assert_eq!((size(3857, DVec2::ZERO), size(4326, DVec2::ZERO)), (None, None));
     }
 
     #[test]

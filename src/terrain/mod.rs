@@ -110,6 +110,7 @@ impl Terrain {
             Some(_) => {}
         }
         raster.notes.extend(terrain.crs.caveat().map(str::to_owned));
+        raster.notes.extend(terrain.distortion());
         terrain.notes = raster.notes;
         terrain.source = raster.source;
         Ok(terrain)
@@ -171,6 +172,24 @@ impl Terrain {
         let (count, min, max, sum) =
             rows.into_iter().fold(NONE, |a, b| (a.0 + b.0, a.1.min(b.1), a.2.max(b.2), a.3 + b.3));
         (self.heights.len() - count, (count > 0).then(|| [min, max, sum / count as f64]))
+    }
+
+    /// Says so if lengths on the map, which distances are measured in, are not those on the ground.
+    fn distortion(&self) -> Option<String> {
+        const NOTABLE: f64 = 0.01;
+        let last = DVec2::new((self.frame.cols() - 1) as f64, (self.frame.rows() - 1) as f64);
+        let places = (0..9).map(|i| last * DVec2::new((i % 3) as f64, (i / 3) as f64) / 2.0);
+        let (least, most) = places
+            .filter_map(|at| self.crs.ground_per_map_metre(self.frame.to_map(at)))
+            .fold((f64::INFINITY, 0f64), |(least, most), size| {
+                (least.min(size.min_element()), most.max(size.max_element()))
+            });
+        (least < 1.0 - NOTABLE || most > 1.0 + NOTABLE).then(|| {
+            format!(
+                "a metre of this map is {least:.2} to {most:.2} m on the ground, and distances are those of the map; \
+                 reproject with `gdalwarp -t_srs` to longitude and latitude or to the UTM zone for those of the ground"
+            )
+        })
     }
 
     /// Longitude (−180 to 180) and latitude in degrees of grid coordinates; see [`Crs::to_lonlat`].

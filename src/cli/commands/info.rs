@@ -1,6 +1,6 @@
 //! `ridgeway info`: what a DEM holds.
 
-use ridgeway::{Result, Smoothing, Terrain};
+use ridgeway::{Ground, Result, Smoothing, Terrain};
 use serde_json::json;
 
 use crate::args::{InfoArgs, RunArgs};
@@ -26,12 +26,11 @@ fn text(args: &InfoArgs, terrain: &Terrain) -> String {
     facts.add("size", format!("{} columns x {} rows", frame.cols(), frame.rows()));
     facts.add(
         "cell",
-        match crs.unit() {
-            "metre" => format!("{dx} x {dy} m"),
-            unit => {
-                let (width, height) = (digits(ground.x), digits(ground.y));
-                format!("{dx} x {dy} {unit} ({width} x {height} m)")
-            }
+        if crs.ground() == Ground::METRES {
+            format!("{dx} x {dy} m")
+        } else {
+            let (width, height) = (digits(ground.x), digits(ground.y));
+            format!("{dx} x {dy} {} ({width} x {height} m)", crs.unit())
         },
     );
     facts.add("CRS", crs.name());
