@@ -291,6 +291,16 @@ fn a_tensor_raster_measures_as_its_tensor_says() {
     assert!((ratio / slope - 1.0).abs() < 1e-4, "{ratio} {slope}");
     let line = "distance plane.tif --start pixel:5,5 --cost";
     folder.bad(&format!("{line} tensor.tif"), 2, "tensor.tif: has 3 bands; a cost raster has one");
+    let cells = "1 ".repeat(41 * 31 - 1);
+    folder.write(
+        "far.asc",
+        &format!("ncols 41\nnrows 31\nxllcorner -15\nyllcorner -15\ncellsize 30\n{cells}9999\n"),
+    );
+    folder.bad(
+        &format!("{line} far.asc"),
+        2,
+        "the costs run from 1 to 9999; more than 1 to 1000 cannot be computed with (use NaN or nodata for barriers)",
+    );
 }
 
 #[test]

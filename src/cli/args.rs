@@ -465,8 +465,8 @@ pub(crate) struct MetricArgs {
     /// Lines and areas (GeoJSON) that may not be crossed; may be given several times.
     #[arg(long, value_name = "FILE.geojson")]
     pub(crate) barrier: Vec<PathBuf>,
-    /// What the ground costs: a raster on the DEM's grid with a factor above 0 on the length of every step;
-    /// cells without a value may not be entered.
+    /// What the ground costs: a raster on the DEM's grid with a factor above 0 on the length of every step,
+    /// the largest at most 1000 times the smallest; cells without a value may not be entered.
     #[arg(long, value_name = "FILE.tif")]
     pub(crate) cost: Option<PathBuf>,
     /// Your own speed tensors: a float raster on the DEM's grid with bands D11, D12, D22, x east, y north.
