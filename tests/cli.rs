@@ -512,6 +512,21 @@ fn places_off_the_ground_are_explained() {
 }
 
 #[test]
+fn heights_that_no_terrain_has_are_blamed_on_no_flag() {
+    let folder = Folder::new();
+    let heights = "1e30 -1e30 0 5e29 ".repeat(25);
+    folder.write(
+        "huge.asc",
+        &format!("ncols 10\nnrows 10\nxllcorner 0\nyllcorner 0\ncellsize 10\n{heights}\n"),
+    );
+    folder.bad(
+        "compare huge.asc --start pixel:0,0 --goal pixel:1,0",
+        2,
+        "--start pixel:0,0 lies where the metric is too extreme to compute with, and so does every other cell",
+    );
+}
+
+#[test]
 fn no_way_is_an_answer_of_its_own() {
     let folder = Folder::new();
     folder.bad(

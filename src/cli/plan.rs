@@ -121,7 +121,8 @@ impl<'a> Journey<'a> {
                     "lies where --tensor has no value or the ground is steeper than --max-slope allows"
                 }
                 (_, Some(_)) => "lies on ground steeper than --max-slope allows",
-                (_, None) => "lies where --tensor has no value",
+                (MetricName::Tensor, None) => "lies where --tensor has no value",
+                (_, None) => "lies where the metric is too extreme to compute with",
             };
             spot.check(&self.terrain, |col, row| field.is_open(col, row), why)?;
         }
