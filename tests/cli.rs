@@ -855,6 +855,8 @@ fn terrains_of_a_few_cells_are_cut_and_matched() {
     }
     let alone = folder.good("match cell.asc");
     assert!(alone.contains("cell.asc: 1 region\none region alone matches none"), "{alone}");
+    let flat = folder.good("match row.asc --epsilon 1e-9");
+    assert!(flat.contains("row.asc: 7 regions\nno pair of regions in which"), "{flat}");
     folder.write(
         "void.asc",
         "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n-9 -9\n",

@@ -211,7 +211,12 @@ fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
         text += &format!("{}: {count} {noun}\n", title(subject.path));
     }
     if found.is_empty() {
-        return text + "one region alone matches none; cut finer by --epsilon or --levels\n";
+        let regions: usize = subjects.iter().map(|subject| subject.signatures.len()).sum();
+        return text
+            + match regions {
+                0 | 1 => "one region alone matches none; cut finer by --epsilon or --levels\n",
+                _ => "no pair of regions in which the shape varies; cut coarser by --epsilon\n",
+            };
     }
     let mut table = Table::default();
     let header = ["", "first", "second", "unlike", "size", "size", "ratio", "best of all"];
