@@ -1,9 +1,12 @@
 //! Output files, checked before the work starts.
 
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use ridgeway::export::{Band, Samples, check_folder_free, check_free, write_file, write_geotiff};
+use ridgeway::export::{
+    Band, Samples, check_folder_free, check_free, write_file, write_folder, write_geotiff,
+};
 use ridgeway::{Error, Result, Terrain};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can
@@ -89,6 +92,24 @@ pub(crate) fn write_raster(
 /// The disk's.
 pub(crate) fn write_content(path: &Path, overwrite: bool, content: &[u8]) -> Result<()> {
     write_file(path, overwrite, |out| out.write_all(content))
+}
+
+/// Fills a folder with files whose content is ready, with all or none.
+///
+/// # Errors
+/// The disk's.
+pub(crate) fn write_contents(
+    folder: &Path,
+    overwrite: bool,
+    names: &[&str],
+    contents: &[Vec<u8>],
+) -> Result<()> {
+    write_folder(folder, overwrite, |temporary| {
+        names.iter().zip(contents).try_for_each(|(name, content)| {
+            fs::write(temporary.join(name), content)
+                .map_err(|source| Error::io(folder.join(name), source))
+        })
+    })
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {

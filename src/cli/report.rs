@@ -59,6 +59,12 @@ pub(crate) fn wrote(path: &Path) -> String {
     format!("wrote {}\n", path.display())
 }
 
+/// A line that names the files written into a folder.
+pub(crate) fn wrote_in(folder: &Path, names: &[&str]) -> String {
+    let files: Vec<_> = names.iter().map(|name| folder.join(name).display().to_string()).collect();
+    format!("wrote {}\n", files.join(", "))
+}
+
 /// Rows of cells with the first column to the left and the others, numbers, to the right.
 #[derive(Default)]
 pub(crate) struct Table(Vec<Vec<String>>);

@@ -1,18 +1,15 @@
 //! `ridgeway compare`: one pair of places under several metrics.
 
-use std::fs;
-use std::path::Path;
-
-use ridgeway::export::{routes_geojson, write_folder};
+use ridgeway::export::routes_geojson;
 use ridgeway::{Comparison, Control, Error, MetricField, Result, Route};
 use serde_json::{Value, json};
 
 use super::render;
 use super::route::{HEADER, measures, profiles};
 use crate::args::{CompareArgs, MetricName, RunArgs};
-use crate::output::check_outputs_in;
+use crate::output::{check_outputs_in, write_contents};
 use crate::plan::Journey;
-use crate::report::{Report, Table};
+use crate::report::{Report, Table, wrote_in};
 
 const FILES: [&str; 4] = ["routes.geojson", "profile.csv", "summary.json", "map.png"];
 
@@ -47,15 +44,11 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     let table = table(&fields, &comparison).to_string();
     let summary = summary(&fields, &comparison, &journey);
     if let Some(folder) = &args.output {
+        let contents = contents(args, &fields, &comparison, &summary, &journey)?;
         control.check()?;
-        write_folder(folder, args.overwrite, |folder| {
-            write_files(folder, args, &fields, &comparison, &summary, &journey)
-        })?;
+        write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
-    let written = args.output.iter().map(|folder| {
-        let files = FILES.map(|name| folder.join(name).display().to_string());
-        format!("wrote {}\n", files.join(", "))
-    });
+    let written = args.output.iter().map(|folder| wrote_in(folder, &FILES));
     Report { text: table + EXPLANATION + &written.collect::<String>(), json: summary }.print(run)
 }
 
@@ -117,26 +110,22 @@ fn summary(fields: &[MetricField<'_>], comparison: &Comparison, journey: &Journe
     json!({ "routes": routes, "provenance": journey.provenance(fields) })
 }
 
-fn write_files(
-    folder: &Path,
+/// The content of each of [`FILES`].
+fn contents(
     args: &CompareArgs,
     fields: &[MetricField<'_>],
     comparison: &Comparison,
     summary: &Value,
     journey: &Journey<'_>,
-) -> Result<()> {
+) -> Result<[Vec<u8>; FILES.len()]> {
     let named: Vec<(&str, &Route)> =
         fields.iter().map(MetricField::name).zip(&comparison.routes).collect();
     let Comparison { routes, distances, .. } = comparison;
     let geojson = routes_geojson(&named, journey.terrain.crs(), &journey.provenance(fields))?;
-    let contents = [
+    Ok([
         geojson.into_bytes(),
         profiles(&named, journey)?,
         format!("{summary:#}\n").into_bytes(),
         render::map(journey, &args.dem, fields, routes, distances, PIXELS)?,
-    ];
-    for (name, content) in FILES.iter().zip(&contents) {
-        fs::write(folder.join(name), content).map_err(|source| Error::io(name, source))?;
-    }
-    Ok(())
+    ])
 }

@@ -35,10 +35,13 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
     let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
     let map = journey.solve(&field, &stop)?;
-    control.check()?;
     let provenance = journey.provenance(std::slice::from_ref(&field));
-    if let Some(path) = &args.isolines {
-        let content = isolines_file(args, &journey, &map, &provenance)?;
+    let isolines = match &args.isolines {
+        Some(path) => Some((path, isolines_file(args, &journey, &map, &provenance)?)),
+        None => None,
+    };
+    control.check()?;
+    if let Some((path, content)) = isolines {
         write_content(path, args.overwrite, &content)?;
     }
     if let Some(path) = &args.output {

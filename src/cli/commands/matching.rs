@@ -1,11 +1,9 @@
 //! `ridgeway match`: regions of like shape on two surfaces, or on one.
 
-use std::fs;
 use std::path::Path;
 
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
-use ridgeway::export::write_folder;
 use ridgeway::region::{
     Level, Match, Neighbours, Signature, matches, matches_within, outlines, signatures,
 };
@@ -19,9 +17,9 @@ use serde_json::{Value, json};
 use super::render::title;
 use super::segment::cut;
 use crate::args::{MatchArgs, MetricName, RunArgs};
-use crate::output::check_outputs_in;
+use crate::output::{check_outputs_in, write_contents};
 use crate::plan::{Journey, command_line};
-use crate::report::{Report, Table, digits, metres};
+use crate::report::{Report, Table, digits, metres, wrote_in};
 
 const FILES: [&str; 3] = ["matches.json", "regions.png", "signatures.png"];
 
@@ -47,23 +45,16 @@ pub(super) fn run(args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<
     };
     let summary = summary(&subjects, &found);
     if let Some(folder) = &args.output {
-        control.check()?;
         let colours = colours(&subjects, &found);
         let contents = [
             format!("{summary:#}\n").into_bytes(),
             regions(&subjects, &colours)?,
             plot(&subjects, &colours)?,
         ];
-        write_folder(folder, args.overwrite, |folder| {
-            FILES.iter().zip(&contents).try_for_each(|(name, content)| {
-                fs::write(folder.join(name), content).map_err(|source| Error::io(name, source))
-            })
-        })?;
+        control.check()?;
+        write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
-    let written = args.output.iter().map(|folder| {
-        let files = FILES.map(|name| folder.join(name).display().to_string());
-        format!("wrote {}\n", files.join(", "))
-    });
+    let written = args.output.iter().map(|folder| wrote_in(folder, &FILES));
     let text = table(&subjects, &found) + &written.collect::<String>();
     Report { text, json: summary }.print(run)
 }
