@@ -53,7 +53,7 @@ pub(crate) enum Command {
     Route(RouteArgs),
     /// Plan one route under several metrics and measure each under all of them.
     Compare(CompareArgs),
-    /// Cut the terrain into regions of like shape; their borders fall on ridges and valleys.
+    /// Cut the terrain into regions of like shape; their borders tend to lie on ridges and valleys.
     Segment(SegmentArgs),
     /// Find regions of like shape on two surfaces, or on one.
     Match(MatchArgs),
@@ -472,7 +472,7 @@ pub(crate) struct MetricArgs {
     /// Your own speed tensors: a float raster on the DEM's grid with bands D11, D12, D22, x east, y north.
     #[arg(long, value_name = "FILE.tif")]
     pub(crate) tensor: Option<PathBuf>,
-    /// How exactly to solve: `high` is of second order in the cell size and takes 2.5 to 3.6 times as long in the solver.
+    /// How exactly to solve: `high` is of second order in the cell size and takes 2.3 to 3.4 times as long in the solver.
     #[arg(long, value_enum, value_name = "HOW", default_value_t = AccuracyName::Fast)]
     pub(crate) accuracy: AccuracyName,
 }
