@@ -56,7 +56,7 @@
 //! | derivatives of height | 1, 1/m | ground axes: x east, y **north** |
 //! | curvature `κ` | 1/m | positive where the ground bends towards the upward normal: a hollow |
 //! | speed tensor `D`, metric `M = D⁻¹` | | ground axes; large `D` = fast = short |
-//! | distance `g` | m, or AG units for the curvature metric | 0 on the start region |
+//! | distance `g` | m, or AG units ([`MetricField::unit`]) | 0 on the start region |
 //!
 //! Work runs on the current rayon pool, and no result depends on the number of threads, not in one bit.
 //! Nothing panics on data; see [`Error`].
