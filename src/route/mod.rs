@@ -34,8 +34,8 @@ pub struct Route {
 ///
 /// The line begins exactly on the start region, ends exactly at the goal, has a point at least every half cell, and
 /// enters no wall. It is the line of steepest descent on the distance, moved sideways to the nearest one that is shortest under
-/// `metric`, which knows the surface between the nodes too; it never costs more, so a little less than the distance is
-/// possible.
+/// `metric`, which knows the surface between the nodes too; it never costs more than that line. [`Summary::cost`] is measured
+/// between the nodes as well, so it differs from the distance at the goal by the errors of both.
 ///
 /// # Errors
 /// [`Error::NoWay`] if the front did not reach the goal.
