@@ -527,6 +527,22 @@ fn heights_that_no_terrain_has_are_blamed_on_no_flag() {
 }
 
 #[test]
+fn a_climb_weight_beyond_what_the_grid_can_follow_is_told() {
+    let folder = Folder::new();
+    let line = "distance range.tif --start pixel:10,10 --climb-weight";
+    for (flags, told) in [
+        ("20", "on the curvature metric"),
+        ("0.01", ""),
+        ("20 -q", ""),
+        ("20 --metric isotropic", ""),
+        ("2000 --metric isotropic", "on the isotropic metric, 1.000: "),
+    ] {
+        let err = folder.run(&format!("{line} {flags}")).err;
+        assert!(err.contains(told) && err.is_empty() == told.is_empty(), "{flags}: {err}");
+    }
+}
+
+#[test]
 fn no_way_is_an_answer_of_its_own() {
     let folder = Folder::new();
     folder.bad(

@@ -207,7 +207,8 @@ pub(crate) struct DistanceArgs {
 #[command(after_help = "\
 Examples:
   ridgeway route valley.tif --start 388400,4711200 --goal 391250,4709800 -o route.geojson
-  ridgeway route valley.tif --start pixel:40,60 --goal huts.geojson --climb-weight 20 -o routes.gpx")]
+  ridgeway route valley.tif --start pixel:40,60 --goal huts.geojson --metric isotropic \
+--climb-weight 20 -o routes.gpx")]
 pub(crate) struct RouteArgs {
     /// The DEM.
     pub(crate) dem: PathBuf,
@@ -456,7 +457,8 @@ pub(crate) struct MetricArgs {
     ///
     /// On the isotropic metric going up or down a grade s costs √(1 + s² + βs²) per plan metre: with
     /// 100 a grade of 10 % costs 1.4 times as much as level ground. On the curvature metric level,
-    /// straight ground costs √δ, so the same aversion takes 100 δ.
+    /// straight ground costs √δ, so the same aversion takes 100 δ. With more than 1000, or 1000 δ,
+    /// distances come out far too short.
     #[arg(long, value_name = "BETA", default_value = "0", value_parser = not_negative, allow_hyphen_values = true)]
     pub(crate) climb_weight: f64,
     /// Ground steeper than this many degrees may not be entered.
