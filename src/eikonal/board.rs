@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use super::field::{AREA, SIDE, Tiling};
 use super::tiles::Values;
-use super::update::Block;
+use super::update::{Block, Limits};
 
 /// Values at the nodes as the bits of `f32`, tile by tile.
 ///
@@ -99,5 +99,40 @@ impl Board {
                 bits.store(self.outside.to_bits(), Relaxed);
             }
         }
+    }
+}
+
+/// What is known of each tile, shared and written as the values are: [`Limits`] as the bits of their numbers.
+#[derive(Debug)]
+pub(super) struct LimitsBoard(Vec<[AtomicU32; 3]>);
+
+impl LimitsBoard {
+    pub(super) fn new(limits: Vec<Limits>) -> Self {
+        let bits = |Limits { slack, shift, longest_step }| {
+            [slack, shift, longest_step].map(|limit: f32| AtomicU32::new(limit.to_bits()))
+        };
+        Self(limits.into_iter().map(bits).collect())
+    }
+
+    pub(super) fn into_limits(self) -> Vec<Limits> {
+        (0..self.0.len()).map(|tile| self.at(tile)).collect()
+    }
+
+    pub(super) fn at(&self, tile: usize) -> Limits {
+        let limit = |k: usize| f32::from_bits(self.0[tile][k].load(Relaxed));
+        Limits { slack: limit(0), shift: limit(1), longest_step: limit(2) }
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = Limits> {
+        (0..self.0.len()).map(|tile| self.at(tile))
+    }
+
+    /// What a solve of the tile found: limits only grow.
+    pub(super) fn raise(&self, tile: usize, found: &Limits) {
+        let known = self.at(tile);
+        let slack = known.slack.max(found.slack + found.shift);
+        let longest_step = known.longest_step.max(found.longest_step);
+        self.0[tile][0].store(slack.to_bits(), Relaxed);
+        self.0[tile][2].store(longest_step.to_bits(), Relaxed);
     }
 }

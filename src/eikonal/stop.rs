@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::board::Board;
+use super::board::{Board, LimitsBoard};
 use super::field::{AREA, TensorField};
 use super::tiles::Values;
 use super::update::{Limits, UNREACHED};
@@ -51,7 +51,7 @@ impl Stop {
 pub(super) struct Standing<'a> {
     pub(super) field: &'a TensorField,
     pub(super) board: &'a Board,
-    pub(super) limits: &'a [Limits],
+    pub(super) limits: &'a LimitsBoard,
     /// At most so many nodes have a value.
     pub(super) reached: usize,
     /// Nothing below this value is news to any node; infinite when all is done.
@@ -83,9 +83,9 @@ impl Standing<'_> {
     }
 
     fn final_nodes(&self) -> usize {
-        let count = |(tile, limits): (usize, &Limits)| {
+        let count = |(tile, limits): (usize, Limits)| {
             let values = (0..AREA).map(|place| self.board.at(tile, place));
-            values.filter(|&value| is_final(value, limits, self.news)).count()
+            values.filter(|&value| is_final(value, &limits, self.news)).count()
         };
         self.limits.iter().enumerate().map(count).sum()
     }
@@ -99,7 +99,7 @@ impl Standing<'_> {
         let node = |(c, r)| field.tiling.node(c, r).filter(|&(c, r)| field.is_open(c, r));
         let settled = |(c, r): (usize, usize)| {
             let (tile, place) = field.tiling.place(c, r);
-            self.board.at(tile, place) + self.limits[tile].longest_step < self.news
+            self.board.at(tile, place) + self.limits.at(tile).longest_step < self.news
         };
         let settled = corners.into_iter().filter_map(node).map(settled);
         settled.fold(None, |all, corner| Some(all.unwrap_or(true) && corner))

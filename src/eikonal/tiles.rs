@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::board::Board;
+use super::board::{Board, LimitsBoard};
 use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling, wrap};
@@ -84,18 +84,12 @@ struct Outcome {
     wakes: [f32; 8],
     /// The least value of the tile if it does not stand still yet; infinite if it does.
     unsettled: f32,
-    limits: Limits,
     sweeps: u32,
 }
 
 impl Default for Outcome {
     fn default() -> Self {
-        Self {
-            wakes: [f32::INFINITY; 8],
-            unsettled: f32::INFINITY,
-            limits: Limits::default(),
-            sweeps: 0,
-        }
+        Self { wakes: [f32::INFINITY; 8], unsettled: f32::INFINITY, sweeps: 0 }
     }
 }
 
@@ -141,7 +135,6 @@ pub(super) struct Queue {
     /// them has the least.
     sides: Vec<u16>,
     first: Vec<u8>,
-    limits: Vec<Limits>,
     /// How often the tile was solved.
     activations: Vec<u32>,
     /// Number of the round that last took the tile or one of its neighbours.
@@ -155,7 +148,6 @@ impl Queue {
             key: vec![f32::INFINITY; tiles],
             sides: vec![0; tiles],
             first: vec![0; tiles],
-            limits: vec![Limits::default(); tiles],
             activations: vec![0; tiles],
             taken: vec![0; tiles],
         }
@@ -178,10 +170,9 @@ impl Queue {
         self.waiting.iter().map(|&t| self.key[t as usize]).fold(f32::INFINITY, f32::min)
     }
 
-    /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first, and gives them in order of
-    /// place.
-    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<Job>) {
-        taken.clear();
+    /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first, and gives them, as the bits of
+    /// [`Job`]s, in order of place.
+    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u64>) {
         // Keys are not negative, so that their bits are in order.
         let ranked = |&tile: &u32| (self.key[tile as usize], tile);
         let mut candidates: Vec<u64> = self
@@ -198,14 +189,14 @@ impl Queue {
             if self.taken[i] == round {
                 continue;
             }
-            taken.push(Job { tile, sides: self.sides[i], first: self.first[i] });
+            taken.push(Job { tile, sides: self.sides[i], first: self.first[i] }.to_bits());
             self.key[i] = f32::INFINITY;
             self.taken[i] = round;
             for (_, n) in neighbours(tiling, i) {
                 self.taken[n] = round;
             }
         }
-        taken.sort_unstable_by_key(|job| job.tile);
+        taken.sort_unstable();
         let key = &self.key;
         self.waiting.retain(|&t| key[t as usize] < f32::INFINITY);
     }
@@ -218,6 +209,17 @@ pub(super) struct Job {
     /// The sides that have news, and the one with the least, see [`Queue`].
     sides: u16,
     first: u8,
+}
+
+impl Job {
+    /// The tile in the upper half, so that bits are in its order.
+    fn to_bits(self) -> u64 {
+        u64::from(self.tile) << 32 | u64::from(self.sides) << 16 | u64::from(self.first)
+    }
+
+    pub(super) fn from_bits(bits: u64) -> Self {
+        Self { tile: (bits >> 32) as u32, sides: (bits >> 16) as u16, first: bits as u8 }
+    }
 }
 
 /// The tile `(dx, dy)` from another.
@@ -242,8 +244,7 @@ pub(super) fn neighbours(tiling: &Tiling, tile: usize) -> impl Iterator<Item = (
 #[derive(Debug)]
 struct Shared {
     board: Board,
-    queue: Queue,
-    taken: Vec<Job>,
+    limits: LimitsBoard,
 }
 
 /// Which of the values given to a solve are news.
@@ -289,7 +290,7 @@ pub(super) fn solve(
     control: &Control,
 ) -> Result<Option<Solution>> {
     let tiling = field.tiling;
-    let mut queue = Queue { limits, ..Queue::new(tiling.tiles()) };
+    let mut queue = Queue::new(tiling.tiles());
     let board = Board::new(values, f32::INFINITY);
     let had = match news {
         News::All => {
@@ -311,53 +312,52 @@ pub(super) fn solve(
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
     let mut settles = true;
     let mut statistics = Statistics::default();
-    let shared = Shared { board, queue, taken: Vec::new() };
-    let work = |bench: &mut Bench, shared: &Shared, index: usize| {
-        let job = shared.taken[index];
+    let shared = Shared { board, limits: LimitsBoard::new(limits) };
+    let work = |bench: &mut Bench, job: u64| {
+        let job = Job::from_bits(job);
         let tile = job.tile as usize;
         let first = tiling.first(tile);
         let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
-        solve_tile(bench, &tiling, &input, rule, shared, job)
+        solve_tile(bench, &tiling, &input, rule, &shared, job)
     };
-    let lead =
-        |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| -> Result<usize> {
-            let Shared { board, queue, taken } = shared;
-            for (job, outcome) in taken.iter().zip(outcomes) {
-                let activations = &mut queue.activations[job.tile as usize];
-                *activations += 1;
-                settles &= *activations < most;
-                statistics.activations += 1;
-                statistics.tiles += usize::from(*activations == 1);
-                statistics.sweeps += outcome.sweeps as usize;
-                settle(&tiling, queue, job.tile as usize, &outcome);
-            }
-            control.check()?;
-            if !settles {
-                return Ok(0);
-            }
-            if statistics.rounds.is_multiple_of(64) {
-                control.report("solving distance", statistics.tiles as f64 / tiling.tiles() as f64);
-            }
-            least = queue.least_key();
-            let reached = had + statistics.tiles * AREA;
-            let standing = Standing { field, board, limits: &queue.limits, reached, news: least };
-            taken.clear();
-            if queue.waiting.is_empty() || standing.allows(stop) {
-                return Ok(0);
-            }
-            statistics.rounds += 1;
-            let limit = (least + window).min(standing.last_news(stop));
-            queue.take(&tiling, limit, statistics.rounds as u32, taken);
-            Ok(taken.len())
-        };
-    let Shared { board, queue, .. } = crew::run(shared, lead, work)?;
-    let mut values = board.into_values();
+    let lead = |jobs: &mut Vec<u64>, outcomes: &[Outcome]| -> Result<()> {
+        for (job, outcome) in jobs.drain(..).zip(outcomes) {
+            let tile = Job::from_bits(job).tile as usize;
+            let activations = &mut queue.activations[tile];
+            *activations += 1;
+            settles &= *activations < most;
+            statistics.activations += 1;
+            statistics.tiles += usize::from(*activations == 1);
+            statistics.sweeps += outcome.sweeps as usize;
+            settle(&tiling, &mut queue, tile, outcome);
+        }
+        control.check()?;
+        if !settles {
+            return Ok(());
+        }
+        if statistics.rounds.is_multiple_of(64) {
+            control.report("solving distance", statistics.tiles as f64 / tiling.tiles() as f64);
+        }
+        least = queue.least_key();
+        let reached = had + statistics.tiles * AREA;
+        let Shared { board, limits } = &shared;
+        let standing = Standing { field, board, limits, reached, news: least };
+        if queue.waiting.is_empty() || standing.allows(stop) {
+            return Ok(());
+        }
+        statistics.rounds += 1;
+        let limit = (least + window).min(standing.last_news(stop));
+        queue.take(&tiling, limit, statistics.rounds as u32, jobs);
+        Ok(())
+    };
+    crew::run(tiling.tiles(), lead, work)?;
+    let (mut values, limits) = (shared.board.into_values(), shared.limits.into_limits());
     if *stop != Stop::Never {
-        stop::mask(&mut values, field, &queue.limits, least, stop);
+        stop::mask(&mut values, field, &limits, least, stop);
     }
-    Ok(settles.then_some(Solution { values, limits: queue.limits, statistics }))
+    Ok(settles.then_some(Solution { values, limits, statistics }))
 }
 
 /// Wakes every tile that holds a start value, and its neighbours, on all sides.
@@ -409,11 +409,8 @@ pub(super) fn opposite(side: usize) -> usize {
     (side + 4) % 8
 }
 
-/// Keeps what is now known of a tile and wakes the neighbours it can improve.
+/// Wakes the neighbours that a tile can improve.
 fn settle(tiling: &Tiling, queue: &mut Queue, tile: usize, outcome: &Outcome) {
-    let limits = &mut queue.limits[tile];
-    limits.slack = limits.slack.max(outcome.limits.slack + outcome.limits.shift);
-    limits.longest_step = limits.longest_step.max(outcome.limits.longest_step);
     if outcome.unsettled < f32::INFINITY {
         queue.wake(tile, outcome.unsettled, ITSELF);
     }
@@ -457,7 +454,8 @@ fn solve_tile(
         }
         by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps.is_multiple_of(2);
     }
-    outcome.limits = bench.limits();
+    let limits = bench.limits();
+    shared.limits.raise(tile, &limits);
     if changed {
         let block = bench.values();
         let settled = (owed, changes) == ([0; 2], [0; 2]);
@@ -467,7 +465,7 @@ fn solve_tile(
                 .flat_map(|line| &line[1..=SIDE])
                 .fold(f32::INFINITY, |least, &value| least.min(value));
         }
-        outcome.wakes = wakes(tiling, shared, (tile, size), &outcome.limits, block);
+        outcome.wakes = wakes(tiling, shared, (tile, size), &limits, block);
         shared.board.store(tile, block);
     }
     outcome
@@ -490,7 +488,7 @@ fn wakes(
     };
     let slack = |(dx, dy): (isize, isize)| {
         let Some(n) = neighbour(tiling, tile, dx, dy) else { return 0.0 };
-        let slack = shared.queue.limits[n].slack;
+        let slack = shared.limits.at(n).slack;
         // A periodic direction may be one tile wide.
         if n == tile { slack.max(limits.slack + limits.shift) } else { slack }
     };

@@ -18,13 +18,6 @@ use crate::{Control, Result};
 const MOST_SWEEPS: usize = 40;
 const MOST_ACTIVATIONS: u32 = 40;
 
-/// What the transport shares between rounds.
-struct Shared {
-    e: Board,
-    queue: Queue,
-    taken: Vec<Job>,
-}
-
 #[derive(Default)]
 struct Outcome {
     settled: bool,
@@ -50,19 +43,18 @@ pub(super) fn carry(
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
     let e = Board::new(Values { tiling, tiles: e }, 0.0);
-    let shared = Shared { e, queue: Queue::new(tiles), taken: Vec::new() };
-    let work = |_: &mut (), shared: &Shared, index: usize| {
-        let tile = shared.taken[index].tile as usize;
+    let mut queue = Queue::new(tiles);
+    let work = |_: &mut (), job: u64| {
+        let tile = Job::from_bits(job).tile as usize;
         match patch.feet(tile) {
-            Some((feet, _)) => carry_tile(&tiling, feet, &shared.e, tile, tolerance),
+            Some((feet, _)) => carry_tile(&tiling, feet, &e, tile, tolerance),
             None => Outcome { settled: true, changed: 0 },
         }
     };
-    let lead = |shared: &mut Shared, outcomes: &mut dyn Iterator<Item = Outcome>| {
+    let lead = |jobs: &mut Vec<u64>, outcomes: &[Outcome]| {
         control.check()?;
-        let Shared { queue, taken, .. } = shared;
-        for (job, outcome) in taken.iter().zip(outcomes) {
-            let tile = job.tile as usize;
+        for (job, outcome) in jobs.drain(..).zip(outcomes) {
+            let tile = Job::from_bits(job).tile as usize;
             activations[tile] += 1;
             let mut wake = |tile: usize| {
                 if activations[tile] < MOST_ACTIVATIONS {
@@ -83,7 +75,6 @@ pub(super) fn carry(
                 }
             }
         }
-        taken.clear();
         let next = order.peek().map_or(f32::INFINITY, |&tile| keys[tile as usize]);
         let limit = queue.least_key().min(next) + window;
         while let Some(tile) = order.next_if(|&tile| keys[tile as usize] <= limit) {
@@ -91,12 +82,12 @@ pub(super) fn carry(
         }
         if limit.is_finite() {
             round += 1;
-            queue.take(&tiling, limit, round, taken);
+            queue.take(&tiling, limit, round, jobs);
         }
-        Ok(taken.len())
+        Ok(())
     };
-    let e = crew::run(shared, lead, work)?.e.into_values().tiles;
-    Ok((e, beyond))
+    crew::run(tiles, lead, work)?;
+    Ok((e.into_values().tiles, beyond))
 }
 
 /// Sweeps the correction through a tile until it stands still.
