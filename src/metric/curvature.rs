@@ -63,6 +63,7 @@ pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
 }
 
 /// The same on any surface, in grid coordinates: the first formula above with `H`, `K`, `G` and `B` as they are.
+#[inline(always)]
 pub(crate) fn of_surface(jet: &SurfaceJet, delta: f64) -> Sym2 {
     let Forms { inverse, second: b, mean: h, gaussian: k } = jet.forms();
     let (q, c, sum) = if k < 0.0 {

@@ -31,18 +31,21 @@ impl Sym2 {
 
     /// Determinant.
     #[must_use]
+    #[inline(always)]
     pub fn det(self) -> f64 {
         self.xx * self.yy - self.xy * self.xy
     }
 
     /// Inverse; not finite if the matrix is singular.
     #[must_use]
+    #[inline(always)]
     pub fn inverse(self) -> Self {
         Self::new(self.yy, -self.xy, self.xx) * self.det().recip()
     }
 
     /// `A v`.
     #[must_use]
+    #[inline(always)]
     pub fn apply(self, v: DVec2) -> DVec2 {
         DVec2::new(self.xx * v.x + self.xy * v.y, self.xy * v.x + self.yy * v.y)
     }
@@ -67,6 +70,7 @@ impl Sym2 {
 
     /// `P A P` for a symmetric `P`.
     #[must_use]
+    #[inline(always)]
     pub fn within(self, p: Self) -> Self {
         let (a, b) = (self.apply(DVec2::new(p.xx, p.xy)), self.apply(DVec2::new(p.xy, p.yy)));
         let (a, b) = (p.apply(a), p.apply(b));

@@ -110,6 +110,7 @@ pub(crate) struct Forms {
 impl SurfaceJet {
     /// First fundamental form `G = JᵀJ`, `J = [S_1 S_2]`.
     #[must_use]
+    #[inline(always)]
     pub fn first_form(&self) -> Sym2 {
         let [a, b] = self.first;
         Sym2::new(a.length_squared(), a.dot(b), b.length_squared())
@@ -133,6 +134,7 @@ impl SurfaceJet {
 
     /// Whether the surface has a tangent plane there: `S_1` and `S_2` are neither 0 nor parallel, but for rounding.
     #[must_use]
+    #[inline(always)]
     pub fn is_regular(&self) -> bool {
         let [a, b] = self.first;
         let square = b.cross(a).length_squared();
@@ -147,7 +149,7 @@ impl SurfaceJet {
     }
 
     /// All that the two forms give, from one root and one division: with `N = S_2 × S_1`, `det G = N²` and `B_ij = S_ij·N/|N|`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn forms(&self) -> Forms {
         let (g, [a, b]) = (self.first_form(), self.first);
         let normal = b.cross(a);
@@ -167,6 +169,7 @@ impl SurfaceJet {
 
     /// Area of the surface per unit of the parameters, `√det G`.
     #[must_use]
+    #[inline(always)]
     pub fn area(&self) -> f64 {
         self.first[0].cross(self.first[1]).length()
     }
@@ -188,7 +191,7 @@ impl ParametricSurface for HeightSurface {
     }
 
     fn space_jet(&self, at: DVec2) -> SurfaceJet {
-        self.on_ground(at, &self.jet(at))
+        on_ground(at, self.frame().spacing(at.y), &self.jet(at))
     }
 
     /// The means are those of [`rms_curvature`](Self::rms_curvature), over the map.
@@ -200,20 +203,19 @@ impl ParametricSurface for HeightSurface {
     fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
         let mut jets = vec![HeightJet::default(); self.frame().cols()];
         self.row_jets(row, &mut jets);
+        let spacing = self.frame().spacing(row as f64);
         let at = |col: usize| DVec2::new(col as f64, row as f64);
-        jets.iter().enumerate().map(|(col, jet)| self.on_ground(at(col), jet)).collect()
+        jets.iter().enumerate().map(|(col, jet)| on_ground(at(col), spacing, jet)).collect()
     }
 }
 
-impl HeightSurface {
-    fn on_ground(&self, at: DVec2, jet: &HeightJet) -> SurfaceJet {
-        let DVec2 { x, y } = self.frame().spacing(at.y);
-        let up = |z: f64| DVec3::new(0.0, 0.0, z);
-        SurfaceJet {
-            point: DVec3::new(at.x * x, -at.y * y, jet.z),
-            first: [DVec3::new(x, 0.0, jet.zx * x), DVec3::new(0.0, -y, -jet.zy * y)],
-            second: [up(jet.zxx * x * x), up(-jet.zxy * x * y), up(jet.zyy * y * y)],
-        }
+/// A jet in space, from one along the ground axes where nodes are `x` by `y` metres apart.
+fn on_ground(at: DVec2, DVec2 { x, y }: DVec2, jet: &HeightJet) -> SurfaceJet {
+    let up = |z: f64| DVec3::new(0.0, 0.0, z);
+    SurfaceJet {
+        point: DVec3::new(at.x * x, -at.y * y, jet.z),
+        first: [DVec3::new(x, 0.0, jet.zx * x), DVec3::new(0.0, -y, -jet.zy * y)],
+        second: [up(jet.zxx * x * x), up(-jet.zxy * x * y), up(jet.zyy * y * y)],
     }
 }
 

@@ -1,0 +1,117 @@
+//! A surface cut into regions, and sums over them.
+
+use rayon::prelude::*;
+
+use crate::surface::{BLOCK, Lanes, SurfaceJets};
+use crate::{Control, ParametricSurface, Result};
+
+/// A surface cut into regions.
+pub(super) struct Cut<'a> {
+    pub(super) surface: &'a dyn ParametricSurface,
+    pub(super) cols: usize,
+    pub(super) rows: usize,
+    pub(super) periodic: [bool; 2],
+    /// Region of each node, row-major.
+    pub(super) labels: &'a [Option<u32>],
+    pub(super) regions: usize,
+}
+
+/// Neighbouring nodes of a row, at most [`BLOCK`].
+pub(super) struct Run<'a> {
+    /// Column and row of the first.
+    pub(super) node: [usize; 2],
+    pub(super) labels: &'a [Option<u32>],
+    pub(super) jets: SurfaceJets,
+}
+
+/// What is added up over the nodes of a region.
+pub(super) trait Sum: Clone + Default + Send {
+    fn add(&mut self, other: &Self);
+}
+
+impl Run<'_> {
+    /// A number of the region of each node.
+    pub(super) fn of_regions(&self, of: impl Fn(usize) -> f64) -> Lanes {
+        let mut lanes = [0.0; BLOCK];
+        for (lane, label) in lanes.iter_mut().zip(self.labels) {
+            *lane = label.map_or(f64::NAN, |region| of(region as usize));
+        }
+        lanes
+    }
+}
+
+impl Cut<'_> {
+    /// Goes along a row.
+    pub(super) fn along(&self, row: usize, mut visit: impl FnMut(&Run<'_>)) {
+        let jets = self.surface.row_space_jets(row);
+        let labels = &self.labels[row * self.cols..][..self.cols];
+        let mut run = Run { node: [0, row], labels, jets: SurfaceJets::default() };
+        for (jets, labels) in jets.chunks(BLOCK).zip(labels.chunks(BLOCK)) {
+            run.labels = labels;
+            run.jets.load(jets);
+            visit(&run);
+            run.node[0] += BLOCK;
+        }
+    }
+
+    /// The sum of each region over its nodes, of which `values` says what to add. Added in the order of the rows, so that the
+    /// number of threads changes nothing.
+    pub(super) fn sums<T: Sum>(
+        &self,
+        control: &Control,
+        values: impl Fn(&Run<'_>, &mut [T; BLOCK]) + Sync,
+    ) -> Result<Vec<T>> {
+        let of_row = |row: usize| {
+            let mut sums: Vec<(u32, T)> = Vec::new();
+            if control.cancel.is_cancelled() {
+                return sums;
+            }
+            let mut room = std::array::from_fn(|_| T::default());
+            self.along(row, |run| {
+                values(run, &mut room);
+                for (value, label) in room.iter().zip(run.labels) {
+                    let Some(region) = *label else { continue };
+                    // Neighbours along a row are mostly of one region.
+                    match sums.last_mut() {
+                        Some((last, sum)) if *last == region => sum.add(value),
+                        _ => sums.push((region, value.clone())),
+                    }
+                }
+            });
+            sums
+        };
+        let rows: Vec<_> = (0..self.rows).into_par_iter().map(of_row).collect();
+        control.check()?;
+        let mut sums = vec![T::default(); self.regions];
+        for (region, sum) in rows.iter().flatten() {
+            sums[*region as usize].add(sum);
+        }
+        Ok(sums)
+    }
+
+    /// The node at a place beside the grid or in it.
+    pub(super) fn node(&self, col: isize, row: isize) -> Option<usize> {
+        let within = |at: isize, count: usize, periodic: bool| match usize::try_from(at) {
+            Ok(at) if at < count => Some(at),
+            _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
+        };
+        let [around, about] = self.periodic;
+        Some(within(row, self.rows, about)? * self.cols + within(col, self.cols, around)?)
+    }
+
+    /// Whether each node is the first corner of a cell all of whose corners belong to one region; cells over a seam do not count.
+    pub(super) fn inner_cells(&self) -> Vec<bool> {
+        let cols = self.cols;
+        let mut inner = vec![false; self.labels.len()];
+        inner.par_chunks_mut(cols.max(1)).enumerate().for_each(|(row, inner)| {
+            let here = &self.labels[row * cols..];
+            if row + 1 < self.rows {
+                let corners = here.windows(2).zip(here[cols..].windows(2));
+                for (inner, (a, b)) in inner[..cols - 1].iter_mut().zip(corners) {
+                    *inner = a[0].is_some() && a[1] == a[0] && b[0] == a[0] && b[1] == a[0];
+                }
+            }
+        });
+        inner
+    }
+}

@@ -1,0 +1,180 @@
+//! The differences between the curvature tensor at a node and at its four neighbours.
+
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
+
+use glam::DVec2;
+use multiversion::multiversion;
+
+use super::cut::Run;
+use super::extent::Size;
+use super::moments::Moments;
+use super::tensors::{MISSING, Tensor, Tensors, apart, sum};
+use crate::surface::{BLOCK, Lanes};
+use crate::{SurfaceJet, Sym2};
+
+/// Distance of the neighbours on the surface as a share of the region's size. Finite, or opposite neighbours would not
+/// differ and two of the eigenvalues be 0.
+const STEP: f64 = 1.0 / 16.0;
+
+/// Moments of the differences to the neighbours on the surface: at a distance of [`STEP`] both ways along the two tangents in which
+/// `C` changes most and least, per distance.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+pub(super) fn along_surface(
+    tensors: &Tensors<'_>,
+    sizes: &[Size],
+    run: &Run<'_>,
+    moments: &mut [Moments; BLOCK],
+) {
+    let steps = run.of_regions(|region| STEP * sizes[region].side);
+    let first = run.node[1] * tensors.cut.cols + run.node[0];
+    let changes = changes(tensors, run);
+    let neighbours = neighbours(run, &steps, &changes);
+    let cells = [0, 1, 2, 3].map(|k| tensors.cells(&neighbours[k]));
+    let mut squares = [[MISSING; BLOCK]; 4];
+    for (i, label) in run.labels.iter().enumerate() {
+        let Some(region) = *label else { continue };
+        for k in 0..4 {
+            let at = DVec2::new(neighbours[k][0][i], neighbours[k][1][i]);
+            squares[k][i] = tensors.apart(first + i, cells[k][i], at, region);
+        }
+    }
+    let (mut pairs, mut areas) = ([[0.0; BLOCK]; 4], [0.0; BLOCK]);
+    for i in 0..BLOCK {
+        for [k, across] in [[0, 1], [1, 0], [2, 3], [3, 2]] {
+            // One for both where the other is missing; the root of none is no number.
+            let square = if squares[k][i] < 0.0 { squares[across][i] } else { squares[k][i] };
+            pairs[k][i] = square.sqrt() / steps[i];
+        }
+        let jet = run.jets.get(i);
+        areas[i] = if jet.is_regular() { jet.area() } else { 0.0 };
+    }
+    for i in 0..BLOCK {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| pairs[k][i]);
+        moments[i] = Moments::of_pairs([a, b], [c, d], areas[i]);
+    }
+}
+
+/// The same for the neighbours on the grid, as shares of the region's size.
+pub(super) fn along_grid(
+    tensors: &Tensors<'_>,
+    sizes: &[Size],
+    run: &Run<'_>,
+    moments: &mut [Moments; BLOCK],
+) {
+    let of_node = |i: usize, region: u32| {
+        let [col, row] = [run.node[0] + i, run.node[1]].map(|at| at as isize);
+        let here = tensors.at(col, row, region)?;
+        let l = |to: Option<&Tensor>| Some(apart(here, to?).sqrt() / sizes[region as usize].side);
+        let pair = |x: isize, y: isize| {
+            let plus = l(tensors.at(col + x, row + y, region));
+            let minus = l(tensors.at(col - x, row - y, region));
+            Some([plus.or(minus)?, minus.or(plus)?])
+        };
+        let ([a, b], [c, d]) = (pair(1, 0)?, pair(0, 1)?);
+        let jet = run.jets.get(i);
+        jet.is_regular().then(|| Moments::of([a, b, c, d], jet.area()))
+    };
+    for (i, label) in run.labels.iter().enumerate() {
+        moments[i] = label.and_then(|region| of_node(i, region)).unwrap_or_default();
+    }
+}
+
+/// How `C` changes around each node of a run: `⟨∂_i C, ∂_j C⟩` by grid coordinates. 0 along a line on which no neighbour is there.
+#[inline(always)]
+fn changes(tensors: &Tensors<'_>, run: &Run<'_>) -> [Lanes; 3] {
+    let mut changes = [[0.0; BLOCK]; 3];
+    let first = run.node[1] * tensors.cut.cols + run.node[0];
+    for (i, label) in run.labels.iter().enumerate() {
+        let Some(region) = *label else { continue };
+        let products = match tensors.cross(first + i, region) {
+            Some([[east, west], [south, north]]) => {
+                let [mut xx, mut xy, mut yy] = [[0.0; 6]; 3];
+                for k in 0..6 {
+                    let (x, y) = (0.5 * (east[k] - west[k]), 0.5 * (south[k] - north[k]));
+                    (xx[k], xy[k], yy[k]) = (x * x, x * y, y * y);
+                }
+                [sum(xx), sum(xy), sum(yy)]
+            }
+            None => changes_at_border(tensors, [run.node[0] + i, run.node[1]], region),
+        };
+        changes.iter_mut().zip(products).for_each(|(change, product)| change[i] = product);
+    }
+    changes
+}
+
+/// The same beside a border or a seam: one-sided where a neighbour is missing.
+#[inline(never)]
+fn changes_at_border(tensors: &Tensors<'_>, node: [usize; 2], region: u32) -> [f64; 3] {
+    let [col, row] = node.map(|at| at as isize);
+    let slope = |x: isize, y: isize| {
+        let at = |by: isize| tensors.at(col + by * x, row + by * y, region);
+        let (before, after, step) = match [at(-1), at(0), at(1)] {
+            [Some(before), _, Some(after)] => (before, after, 2.0),
+            [None, Some(before), Some(after)] | [Some(before), Some(after), None] => {
+                (before, after, 1.0)
+            }
+            _ => return [0.0; 6],
+        };
+        std::array::from_fn(|k| (after[k] - before[k]) / step)
+    };
+    let (x, y): (Tensor, Tensor) = (slope(1, 0), slope(0, 1));
+    [(x, x), (x, y), (y, y)].map(|(a, b)| sum(std::array::from_fn(|k| a[k] * b[k])))
+}
+
+/// Grid coordinates, columns and rows, of the four neighbours: along the geodesic `u + hv − h²/2 Γ(v, v)` for the unit tangents `v` in
+/// which `C` changes most and least, both ways.
+#[inline(always)]
+fn neighbours(run: &Run<'_>, steps: &Lanes, changes: &[Lanes; 3]) -> [[Lanes; 2]; 4] {
+    let mut neighbours = [[[0.0; BLOCK]; 2]; 4];
+    for i in 0..BLOCK {
+        let (jet, step) = (run.jets.get(i), steps[i]);
+        let node = DVec2::new((run.node[0] + i) as f64, run.node[1] as f64);
+        let ways =
+            tangents(jet.first_form(), Sym2::new(changes[0][i], changes[1][i], changes[2][i]));
+        for k in 0..2 {
+            let (by, middle) = (ways[k] * step, node - bend(&jet, ways[k]) * (0.5 * step * step));
+            let (plus, minus) = (middle + by, middle - by);
+            [neighbours[2 * k][0][i], neighbours[2 * k][1][i]] = plus.to_array();
+            [neighbours[2 * k + 1][0][i], neighbours[2 * k + 1][1][i]] = minus.to_array();
+        }
+    }
+    neighbours
+}
+
+/// The orthogonal unit tangents, in grid coordinates, along which `C` changes most and least: the eigenvectors of the form
+/// `v ↦ ‖∇_v C‖²` under the first form, which do not know of the grid.
+#[inline(always)]
+fn tangents(first_form: Sym2, changes: Sym2) -> [DVec2; 2] {
+    let g = first_form;
+    let root = g.xx.sqrt();
+    let frame = [DVec2::new(1.0 / root, 0.0), DVec2::new(-g.xy, g.xx) / (root * g.det().sqrt())];
+    let [along, across] = frame.map(|e| changes.apply(e));
+    let axis = long_axis(Sym2::new(frame[0].dot(along), frame[1].dot(along), frame[1].dot(across)));
+    [frame[0] * axis.x + frame[1] * axis.y, frame[1] * axis.x - frame[0] * axis.y]
+}
+
+/// Unit eigenvector of the larger eigenvalue.
+#[inline(always)]
+fn long_axis(form: Sym2) -> DVec2 {
+    let half = 0.5 * (form.xx - form.yy);
+    let radius = (half * half + form.xy * form.xy).sqrt();
+    // Of the two expressions, the one that does not cancel.
+    let axis = if half >= 0.0 {
+        DVec2::new(half + radius, form.xy)
+    } else {
+        DVec2::new(form.xy, radius - half)
+    };
+    axis.normalize_or(DVec2::X)
+}
+
+/// `Γ(v, v)`, `Γᵏ_ij = Gᵏˡ S_l·S_ij`.
+#[inline(always)]
+fn bend(jet: &SurfaceJet, v: DVec2) -> DVec2 {
+    let [xx, xy, yy] = jet.second;
+    let second = xx * (v.x * v.x) + xy * (2.0 * v.x * v.y) + yy * (v.y * v.y);
+    jet.first_form().inverse().apply(DVec2::new(jet.first[0].dot(second), jet.first[1].dot(second)))
+}

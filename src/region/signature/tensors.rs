@@ -1,0 +1,176 @@
+//! The curvature tensor in space at the nodes of a cut surface.
+
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
+
+use glam::DVec2;
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use super::cut::{Cut, Run};
+use super::extent::Size;
+use crate::metric::of_surface;
+use crate::surface::{BLOCK, Lanes};
+use crate::{Control, Result, SurfaceJet};
+
+/// A symmetric tensor in space as `xx, yy, zz, √2 yz, √2 xz, √2 xy`: the length of the vector is the Frobenius norm.
+pub(super) type Tensor = [f64; 6];
+
+/// The sum of six numbers in the order that pairs of registers favour.
+#[inline(always)]
+pub(super) fn sum(p: Tensor) -> f64 {
+    ((p[0] + p[2]) + p[4]) + ((p[1] + p[3]) + p[5])
+}
+
+/// `‖a − b‖²`.
+#[inline(always)]
+pub(super) fn apart(a: &Tensor, b: &Tensor) -> f64 {
+    let mut squares = [0.0; 6];
+    for k in 0..6 {
+        let difference = a[k] - b[k];
+        squares[k] = difference * difference;
+    }
+    sum(squares)
+}
+
+/// The curvature tensor at the nodes, with the `δ` of their region.
+pub(super) struct Tensors<'a> {
+    pub(super) cut: &'a Cut<'a>,
+    /// Not finite where the surface is degenerate, 0 at nodes of no region.
+    of: Vec<Tensor>,
+    /// Whether each node is the first corner of a cell inside a region.
+    inner: Vec<bool>,
+}
+
+impl<'a> Tensors<'a> {
+    pub(super) fn new(cut: &'a Cut<'a>, sizes: &[Size], control: &Control) -> Result<Self> {
+        let mut of = vec![[0.0; 6]; cut.labels.len()];
+        of.par_chunks_mut(cut.cols.max(1)).enumerate().for_each(|(row, of)| {
+            if control.cancel.is_cancelled() {
+                return;
+            }
+            cut.along(row, |run| {
+                let deltas = run.of_regions(|region| sizes[region].delta);
+                curvature_tensors(run, &deltas, &mut of[run.node[0]..][..run.labels.len()]);
+            });
+        });
+        control.check()?;
+        Ok(Self { cut, of, inner: cut.inner_cells() })
+    }
+
+    /// The tensor at a node, given by its place in or beside the grid, of a region.
+    pub(super) fn at(&self, col: isize, row: isize, region: u32) -> Option<&Tensor> {
+        let node = self.cut.node(col, row)?;
+        (self.cut.labels[node] == Some(region)).then(|| &self.of[node])
+    }
+
+    /// The tensors after and before a node of a region along columns and along rows, if all four neighbours belong to
+    /// it and lie in the grid.
+    #[inline(always)]
+    pub(super) fn cross(&self, node: usize, region: u32) -> Option<[[&Tensor; 2]; 2]> {
+        let cols = self.cut.cols;
+        let before = node.checked_sub(cols + 1)?;
+        let is_inner =
+            self.inner[node] && self.inner[before] && self.cut.labels[before] == Some(region);
+        is_inner.then(|| {
+            let of = |node: usize| &self.of[node];
+            [[of(node + 1), of(node - 1)], [of(node + cols), of(node - cols)]]
+        })
+    }
+
+    /// The first corners of the cells that grid coordinates lie inside of, as places in the row-major grid; [`MISSING`] on the lines of
+    /// the grid and beyond it.
+    #[inline(always)]
+    pub(super) fn cells(&self, [cols, rows]: &[Lanes; 2]) -> Lanes {
+        let (width, height) = (self.cut.cols as f64, self.cut.rows as f64);
+        let mut cells = [MISSING; BLOCK];
+        for i in 0..BLOCK {
+            let (col, row) = (cols[i].floor(), rows[i].floor());
+            let is_within = col >= 0.0 && col < width && row >= 0.0 && row < height;
+            let is_inside = cols[i] > col && rows[i] > row;
+            cells[i] = if is_within && is_inside { row * width + col } else { MISSING };
+        }
+        cells
+    }
+
+    /// `‖C(x) − C(y)‖²` for a node `x` and grid coordinates `y` in a [cell](Self::cells), bilinear between the nodes; [`MISSING`] unless
+    /// they all belong to the region.
+    #[inline(always)]
+    pub(super) fn apart(&self, node: usize, cell: f64, at: DVec2, region: u32) -> f64 {
+        let (cell, is_cell) = (cell as usize, cell >= 0.0);
+        if is_cell && self.inner[cell] && self.cut.labels[cell] == Some(region) {
+            let (a, b) = (&self.of[cell..][..2], &self.of[cell + self.cut.cols..][..2]);
+            let (here, [p, q, r, s]) = (&self.of[node], weights(at - at.floor()));
+            let mut squares = [0.0; 6];
+            for k in 0..6 {
+                let there = (p * a[0][k] + q * a[1][k]) + (r * b[0][k] + s * b[1][k]);
+                squares[k] = (there - here[k]) * (there - here[k]);
+            }
+            return sum(squares);
+        }
+        self.sample(at, region).map_or(MISSING, |there| apart(&there, &self.of[node]))
+    }
+
+    /// The tensor beside a border or a seam: nodes one by one, and only those that count.
+    #[inline(never)]
+    fn sample(&self, at: DVec2, region: u32) -> Option<Tensor> {
+        // Beside a pole a short way may go round it many times.
+        const FAR: f64 = 1e9;
+        let low = at.floor();
+        let is_near = low.is_finite() && low.abs().max_element() < FAR;
+        if !is_near {
+            return None;
+        }
+        let (col, row) = (low.x as isize, low.y as isize);
+        let weights = weights(at - low);
+        let mut sum = [0.0; 6];
+        for ((i, j), weight) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().zip(weights) {
+            if weight > 0.0 {
+                let tensor = self.at(col + i, row + j, region)?;
+                sum.iter_mut().zip(tensor).for_each(|(sum, c)| *sum += weight * c);
+            }
+        }
+        Some(sum)
+    }
+}
+
+/// What is not there: a place, or the square of a difference.
+pub(super) const MISSING: f64 = -1.0;
+
+/// Bilinear weights of the corners of a cell.
+#[inline(always)]
+fn weights(DVec2 { x: u, y: v }: DVec2) -> [f64; 4] {
+    [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
+}
+
+/// `C` at the nodes of a run with the `δ` of each.
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1",
+))]
+fn curvature_tensors(run: &Run<'_>, deltas: &Lanes, tensors: &mut [Tensor]) {
+    let mut lanes = [[0.0; BLOCK]; 6];
+    for i in 0..BLOCK {
+        let tensor = curvature_tensor(&run.jets.get(i), deltas[i]);
+        for k in 0..6 {
+            lanes[k][i] = tensor[k];
+        }
+    }
+    for (i, tensor) in tensors.iter_mut().enumerate().take(BLOCK) {
+        for k in 0..6 {
+            tensor[k] = lanes[k][i];
+        }
+    }
+}
+
+/// `C = Σ v_i v_iᵀ / (δ+|κ_i|) = J D Jᵀ` in space.
+#[inline(always)]
+fn curvature_tensor(jet: &SurfaceJet, delta: f64) -> Tensor {
+    let d = of_surface(jet, delta);
+    let [a, b] = jet.first.map(|s| s.to_array());
+    let entry = |i: usize, j: usize| {
+        d.xx * a[i] * a[j] + d.xy * (a[i] * b[j] + b[i] * a[j]) + d.yy * b[i] * b[j]
+    };
+    let twice = |i, j| std::f64::consts::SQRT_2 * entry(i, j);
+    [entry(0, 0), entry(1, 1), entry(2, 2), twice(1, 2), twice(0, 2), twice(0, 1)]
+}

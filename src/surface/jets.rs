@@ -1,0 +1,34 @@
+//! Jets of many nodes of any surface, laid out for wide registers.
+
+use glam::DVec3;
+
+use super::SurfaceJet;
+use super::block::Lanes;
+
+/// Derivatives at [`BLOCK`](super::BLOCK) nodes: those of a [`SurfaceJet`] side by side, without the points.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SurfaceJets {
+    first: [[Lanes; 3]; 2],
+    second: [[Lanes; 3]; 3],
+}
+
+impl SurfaceJets {
+    /// Takes the jets of some nodes, at most [`BLOCK`](super::BLOCK); what is there of others means nothing.
+    pub(crate) fn load(&mut self, jets: &[SurfaceJet]) {
+        for (i, jet) in jets.iter().enumerate() {
+            let set = |lanes: &mut [Lanes; 3], s: DVec3| {
+                [lanes[0][i], lanes[1][i], lanes[2][i]] = s.to_array();
+            };
+            self.first.iter_mut().zip(jet.first).for_each(|(lanes, s)| set(lanes, s));
+            self.second.iter_mut().zip(jet.second).for_each(|(lanes, s)| set(lanes, s));
+        }
+    }
+
+    /// The jet of node `i`, with the point at the origin.
+    #[inline(always)]
+    pub(crate) fn get(&self, i: usize) -> SurfaceJet {
+        let at = |lanes: &[Lanes; 3]| DVec3::new(lanes[0][i], lanes[1][i], lanes[2][i]);
+        let ([a, b], [aa, ab, bb]) = (&self.first, &self.second);
+        SurfaceJet { point: DVec3::ZERO, first: [at(a), at(b)], second: [at(aa), at(ab), at(bb)] }
+    }
+}
