@@ -58,7 +58,9 @@ fn stages(criterion: &mut Criterion) {
             let id = |stage: &str| BenchmarkId::new(stage.to_owned(), threads);
             group.bench_function(id("fit"), |b| b.iter(|| pool.install(fit)));
             for metric in [Metric::Isotropic, Metric::Curvature(Default::default())] {
-                let metric = metric.on(&surface, &Modifiers::default()).expect("default options");
+                let metric = metric
+                    .on(&surface, &Modifiers::default(), &Control::default())
+                    .expect("default options");
                 let sample = || TensorField::sample(&metric, &control).expect("not cancelled");
                 group.bench_function(id(&format!("tensors {}", metric.name())), |b| {
                     b.iter(|| pool.install(sample));

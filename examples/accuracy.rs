@@ -75,7 +75,7 @@ fn row(case: &str, error: impl Fn(usize) -> Result<f64, Error>) -> Result<(), Er
 fn directions() -> Result<(), Error> {
     let n = 441;
     let plane = surface(n, |_| 0.0)?;
-    let metric = Metric::Isotropic.on(&plane, &Modifiers::default())?;
+    let metric = Metric::Isotropic.on(&plane, &Modifiers::default(), &Control::default())?;
     let map = solve(&metric, DVec2::ZERO)?;
     let radius = 200.0 / (n - 1) as f64;
     let worst = (0..3600)
@@ -96,7 +96,8 @@ fn farthest_off() -> Result<(), Error> {
         let along = DVec2::from_angle(0.5);
         let tensor = Sym2::outer(along) * ratio + Sym2::outer(along.perp());
         let metric = Metric::Tensor(vec![tensor; n * n].into());
-        let map = solve(&metric.on(&plane, &Modifiers::default())?, DVec2::ZERO)?;
+        let map =
+            solve(&metric.on(&plane, &Modifiers::default(), &Control::default())?, DVec2::ZERO)?;
         let relative = |i: usize| {
             let at = frame.to_map(DVec2::new((i % n) as f64, (i / n) as f64));
             let exact = tensor.inverse().norm(at);
@@ -116,13 +117,19 @@ fn constants() -> Result<(), Error> {
         row(&format!("constant tensor, ratio {ratio}"), |n| {
             let plane = surface(n, |_| 0.0)?;
             let metric = Metric::Tensor(vec![tensor; n * n].into());
-            let map = solve(&metric.on(&plane, &Modifiers::default())?, DVec2::ZERO)?;
+            let map = solve(
+                &metric.on(&plane, &Modifiers::default(), &Control::default())?,
+                DVec2::ZERO,
+            )?;
             Ok(mean_error(&map, plane.frame(), |at| tensor.inverse().norm(at)))
         })?;
     }
     row("plane of slope 0.5, isotropic", |n| {
         let plane = surface(n, |at| 0.5 * at.x)?;
-        let map = solve(&Metric::Isotropic.on(&plane, &Modifiers::default())?, DVec2::ZERO)?;
+        let map = solve(
+            &Metric::Isotropic.on(&plane, &Modifiers::default(), &Control::default())?,
+            DVec2::ZERO,
+        )?;
         Ok(mean_error(&map, plane.frame(), |at| (1.25 * at.x * at.x + at.y * at.y).sqrt()))
     })
 }
@@ -154,7 +161,8 @@ fn cylinder() -> Result<(), Error> {
     for (name, metric, slowness) in metrics() {
         row(&format!("cylinder, {name}"), |n| {
             let trough = cylinder_surface(n)?;
-            let map = solve(&metric.on(&trough, &Modifiers::default())?, start)?;
+            let map =
+                solve(&metric.on(&trough, &Modifiers::default(), &Control::default())?, start)?;
             let exact = |at| (slowness * (unrolled(at) - unrolled(start))).length();
             Ok(mean_error(&map, trough.frame(), exact))
         })?;
@@ -166,7 +174,8 @@ fn sphere() -> Result<(), Error> {
     for (name, metric, slowness) in metrics() {
         row(&format!("sphere cap, {name}"), |n| {
             let cap = surface(n, |at| (RADIUS * RADIUS - at.length_squared()).sqrt())?;
-            let map = solve(&metric.on(&cap, &Modifiers::default())?, DVec2::ZERO)?;
+            let map =
+                solve(&metric.on(&cap, &Modifiers::default(), &Control::default())?, DVec2::ZERO)?;
             let exact = |at: DVec2| slowness.x * RADIUS * (at.length() / RADIUS).asin();
             Ok(mean_error(&map, cap.frame(), exact))
         })?;
@@ -205,7 +214,7 @@ fn routes() -> Result<(), Error> {
     for n in RESOLUTIONS {
         let trough = cylinder_surface(n)?;
         let [_, (_, metric, slowness)] = metrics();
-        let metric = metric.on(&trough, &Modifiers::default())?;
+        let metric = metric.on(&trough, &Modifiers::default(), &Control::default())?;
         let [most, median] = deviation(&metric, DVec2::ZERO, &goals, |at| {
             slowness * unrolled(at) / slowness.max_element()
         })?;
@@ -225,7 +234,7 @@ fn routes() -> Result<(), Error> {
             Sym2::new(1.0 + b * b, a + b, 1.0 + a * a).inverse()
         });
         let metric = Metric::Tensor(tensors.collect());
-        let metric = metric.on(&plane, &Modifiers::default())?;
+        let metric = metric.on(&plane, &Modifiers::default(), &Control::default())?;
         let [most, median] = deviation(&metric, DVec2::ZERO, &goals, phi)?;
         cells.push(format!("{most:.0e} ({median:.0e})"));
     }

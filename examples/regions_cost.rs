@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::DVec2;
 use rayon::ThreadPoolBuilder;
 use ridgeway::eikonal::TensorField;
-use ridgeway::region::{Neighbours, SegmentOptions, Segmentation, seed_ranks, signatures};
+use ridgeway::region::{Neighbours, SegmentOptions, Segmentation, signatures};
 use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Result, Solver, Stop};
 
@@ -58,7 +58,8 @@ fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; 5])>
         times[stage] += 1e3 * clock.elapsed().as_secs_f64();
         clock = Instant::now();
     };
-    let field = TensorField::sample(&metric.on(surface, &Modifiers::default())?, &control)?;
+    let metric = metric.on(surface, &Modifiers::default(), &control)?;
+    let field = TensorField::sample(&metric, &control)?;
     lap(0);
     let start = DVec2::splat(0.5 * (field.cols() - 1) as f64);
     let copy = field.clone();
@@ -67,7 +68,7 @@ fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; 5])>
     let farthest = map.to_row_major().into_iter().fold(0f32, f32::max);
     drop(map);
     lap(1);
-    let ranks = seed_ranks(surface, metric, &control)?;
+    let ranks = metric.seed_ranks();
     lap(2);
     // The default on small grids, some hundred regions on large ones.
     let epsilons = if field.cols() > 300 { vec![f64::from(farthest) / 9.0] } else { Vec::new() };

@@ -39,8 +39,8 @@ fn main() -> Result<(), Error> {
 
     let none = Modifiers::default();
     let metrics = [
-        Metric::Isotropic.on(&surface, &none)?,
-        Metric::Curvature(Delta::default()).on(&surface, &none)?,
+        Metric::Isotropic.on(&surface, &none, &Control::default())?,
+        Metric::Curvature(Delta::default()).on(&surface, &none, &Control::default())?,
     ];
     let start = frame.to_grid(DVec2::new(0.0, -500.0));
     let goal = frame.to_grid(DVec2::new(0.0, 500.0));

@@ -21,7 +21,7 @@
 //! let control = Control::default();
 //! let terrain = Terrain::open("data/jacksboro.tif")?;
 //! let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control)?;
-//! let metric = Metric::Curvature(Default::default()).on(&surface, &Modifiers::default())?;
+//! let metric = Metric::Curvature(Default::default()).on(&surface, &Modifiers::default(), &control)?;
 //!
 //! let start = terrain.frame().to_grid(glam::DVec2::new(-84.38, 36.21));
 //! let goal = terrain.frame().to_grid(glam::DVec2::new(-84.10, 36.39));

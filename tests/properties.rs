@@ -31,7 +31,7 @@ struct Planned {
 fn plan(terrain: &Terrain, metric: &Metric, start: DVec2, goal: DVec2) -> Planned {
     let control = Control::default();
     let surface = HeightSurface::fit(terrain, &FitOptions::default(), &control).unwrap();
-    let field = metric.on(&surface, &Modifiers::default()).unwrap();
+    let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
     let distance =
         Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap();
     let route = trace(&distance, &field, goal).unwrap();
@@ -163,7 +163,7 @@ fn stretched_cells_give_the_same_distances_at_the_same_places() {
         let agreement = if matches!(metric, Metric::Difference(_)) { 0.08 } else { 0.03 };
         let [a, b] = [(&fine, 1.0), (&flat, 2.0)].map(|(terrain, stretch)| {
             let surface = HeightSurface::fit(terrain, &options, &control).unwrap();
-            let field = metric.on(&surface, &Modifiers::default()).unwrap();
+            let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let start = DVec2::new(30.0, 40.0 / stretch);
             let map =
                 Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap();
@@ -216,7 +216,8 @@ fn a_goal_on_the_start_costs_nothing_and_every_route_there_is_best() {
     let terrain = square(N, heights(N));
     let control = Control::default();
     let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
-    let fields = metrics().map(|metric| metric.on(&surface, &Modifiers::default()).unwrap());
+    let fields = metrics()
+        .map(|metric| metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap());
     let comparison =
         Comparison::between(Solver::default(), &fields, &[GOAL.into()], GOAL, &control).unwrap();
     for (m, costs) in comparison.costs.iter().enumerate() {
@@ -240,7 +241,7 @@ fn errors(
     let terrain = shape.terrain(Crs::none(), DVec2::ZERO).unwrap();
     let interpolate = FitOptions { smoothing: Smoothing::Interpolate, ..FitOptions::default() };
     let surface = HeightSurface::fit(&terrain, &interpolate, &control).unwrap();
-    let field = metric.on(&surface, &Modifiers::default()).unwrap();
+    let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
     let start = DVec2::new(-31.3, 20.4);
     let grid = |p: DVec2| terrain.frame().to_grid(p);
     let map =
@@ -295,7 +296,7 @@ fn costs_of_the_ground_refract_like_light() {
         Modifiers { cost: Some(cost), ..Modifiers::default() }
     };
     let solve = |modifiers: &Modifiers| {
-        let field = Metric::Isotropic.on(&surface, modifiers).unwrap();
+        let field = Metric::Isotropic.on(&surface, modifiers, &Control::default()).unwrap();
         assert_eq!(field.unit(), if modifiers.cost.is_some() { "AG units" } else { "m" });
         let start = DVec2::new(30.0, 20.0);
         Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap()
@@ -314,7 +315,7 @@ fn costs_of_the_ground_refract_like_light() {
     assert!((ratio - 3.0).abs() < 1e-4, "{ratio}");
     let half = solve(&cost(|cost| if cost > 1.0 { f32::NAN } else { cost }));
     assert!(half.at_node(100, 99).is_finite() && half.at_node(100, 100).is_infinite());
-    assert!(Metric::Isotropic.on(&surface, &cost(|_| 0.0)).is_err());
+    assert!(Metric::Isotropic.on(&surface, &cost(|_| 0.0), &Control::default()).is_err());
     let short = Modifiers { cost: Some(vec![1.0; 5].into()), ..Modifiers::default() };
-    assert!(Metric::Isotropic.on(&surface, &short).is_err());
+    assert!(Metric::Isotropic.on(&surface, &short, &Control::default()).is_err());
 }

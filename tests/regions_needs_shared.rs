@@ -44,7 +44,7 @@ fn borders_fall_on_ridges_and_valleys() {
         let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
         let ranks = gaussian_ranks(&surface);
         let ratio = |metric: Metric| {
-            let metric = metric.on(&surface, &Modifiers::default()).unwrap();
+            let metric = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let field = TensorField::sample(&metric, &control).unwrap();
             // The radius that gives about so many regions, by bisection.
             let (mut low, mut high) = (0.0, f64::NAN);

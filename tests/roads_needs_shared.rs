@@ -48,7 +48,7 @@ fn share(road: &[DVec2], route: &[DVec2]) -> f64 {
 /// Mean share over the three roads.
 fn mean_share(surface: &HeightSurface, metric: &Metric, roads: &[Vec<DVec2>]) -> f64 {
     let control = Control::default();
-    let field = metric.on(surface, &Modifiers::default()).unwrap();
+    let field = metric.on(surface, &Modifiers::default(), &Control::default()).unwrap();
     let shares = roads.iter().map(|road| {
         let (start, goal) = (road[0], road[road.len() - 1]);
         let map = Solver::default()

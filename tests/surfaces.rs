@@ -13,7 +13,7 @@ const DELTA: f64 = 0.3;
 const RADIUS: f64 = 2.0;
 
 fn curvature(surface: &NurbsGrid) -> SurfaceMetric<'_> {
-    Metric::Curvature(Delta::Absolute(DELTA)).on_surface(surface).unwrap()
+    Metric::Curvature(Delta::Absolute(DELTA)).on_surface(surface, &Control::default()).unwrap()
 }
 
 fn solve(
@@ -160,7 +160,7 @@ fn a_torus_is_closed_both_ways_and_symmetric() {
     let torus = NurbsSurface::revolve(&profile, DVec3::ZERO, DVec3::Z).unwrap();
     assert_eq!(torus.closed(), [true, true]);
     let surface = torus.on_grid(160, 80).unwrap();
-    let metric = Metric::Isotropic.on_surface(&surface).unwrap();
+    let metric = Metric::Isotropic.on_surface(&surface, &Control::default()).unwrap();
     let map = solve(&metric, DVec2::ZERO, Accuracy::Fast);
     let far = map.at_node(80, 40);
     for row in 0..80 {
@@ -190,7 +190,7 @@ fn a_torus_is_closed_both_ways_and_symmetric() {
 #[test]
 fn routes_are_great_circles_across_seams_and_poles() {
     let surface = sphere().on_grid(160, 81).unwrap();
-    let metric = Metric::Isotropic.on_surface(&surface).unwrap();
+    let metric = Metric::Isotropic.on_surface(&surface, &Control::default()).unwrap();
     let start = DVec2::new(150.0, 20.0);
     let map = solve(&metric, start, Accuracy::Fast);
     // Over the seam, beside the pole, and almost exactly over it.
@@ -222,7 +222,9 @@ fn threads_change_no_bit() {
     let of = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let metric = Metric::Curvature(Delta::default()).on_surface(&surface).unwrap();
+            let metric = Metric::Curvature(Delta::default())
+                .on_surface(&surface, &Control::default())
+                .unwrap();
             (metric.delta(), solve(&metric, DVec2::new(10.2, 20.3), Accuracy::High).to_row_major())
         })
     };

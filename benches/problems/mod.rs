@@ -222,7 +222,11 @@ fn fitted(n: usize, height: impl Fn(DVec2) -> f64, control: &Control) -> Result<
     let terrain = Terrain::new(frame, heights, Crs::none())?;
     let options = FitOptions { smoothing: Smoothing::Interpolate, ..FitOptions::default() };
     let surface = HeightSurface::fit(&terrain, &options, control)?;
-    let metric = Metric::Curvature(Delta::Absolute(DELTA)).on(&surface, &Modifiers::default())?;
+    let metric = Metric::Curvature(Delta::Absolute(DELTA)).on(
+        &surface,
+        &Modifiers::default(),
+        &Control::default(),
+    )?;
     TensorField::sample(&metric, control)
 }
 

@@ -31,6 +31,10 @@ pub(crate) fn surface(terrain: &Terrain) -> Result<HeightSurface, Error> {
 }
 
 pub(crate) fn field(surface: &HeightSurface) -> Result<TensorField, Error> {
-    let metric = Metric::Curvature(Delta::default()).on(surface, &Modifiers::default())?;
+    let metric = Metric::Curvature(Delta::default()).on(
+        surface,
+        &Modifiers::default(),
+        &Control::default(),
+    )?;
     TensorField::sample(&metric, &Control::default())
 }

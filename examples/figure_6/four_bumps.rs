@@ -42,7 +42,11 @@ pub(crate) fn segmentation(
     seed: u64,
 ) -> Result<Segmentation, Error> {
     let control = Control::default();
-    let metric = Metric::Curvature(Delta::default()).on(surface, &Modifiers::default())?;
+    let metric = Metric::Curvature(Delta::default()).on(
+        surface,
+        &Modifiers::default(),
+        &Control::default(),
+    )?;
     let field = TensorField::sample(&metric, &control)?;
     let ranks = perturbed(&gaussian_ranks(surface), perturbation, seed);
     Segmentation::of(&field, &ranks, &SegmentOptions::default(), &control)

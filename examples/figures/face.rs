@@ -56,8 +56,8 @@ pub(crate) fn routes(terrain: &Terrain) -> Result<Comparison, Error> {
     let surface = HeightSurface::fit(terrain, &options, &control)?;
     let none = Modifiers::default();
     let metrics = [
-        Metric::Isotropic.on(&surface, &none)?,
-        Metric::Curvature(Default::default()).on(&surface, &none)?,
+        Metric::Isotropic.on(&surface, &none, &Control::default())?,
+        Metric::Curvature(Default::default()).on(&surface, &none, &Control::default())?,
     ];
     let [start, goal] = [START, GOAL].map(|at| terrain.frame().to_grid(at));
     Comparison::between(Solver::default(), &metrics, &[start.into()], goal, &control)

@@ -70,7 +70,7 @@ impl ParametricSurface for HalfCylinders {
 /// Which half each node falls to, and the share of the nodes that fall to their own.
 pub(crate) fn divide(surface: &HalfCylinders, metric: &Metric) -> Result<(Vec<bool>, f64)> {
     let control = Control::default();
-    let field = metric.on_surface(surface)?.sample(&control)?;
+    let field = metric.on_surface(surface, &control)?.sample(&control)?;
     let seeds = surface.seeds().map(StartRegion::from);
     let map: DistanceMap = Solver::default().solve_field(field, &seeds, &Stop::Never, &control)?;
     let second: Vec<bool> = map.labels().iter().map(|&label| label == Some(1)).collect();

@@ -27,7 +27,7 @@ pub(crate) fn compare(metric: &Metric, n: usize) -> Result<Comparison> {
     let start = DVec2::new(0.3 * cols as f64, 0.35 * n as f64);
     let solve = |surface: &NurbsGrid, start: DVec2| {
         let control = Control::default();
-        let field = metric.on_surface(surface)?.sample(&control)?;
+        let field = metric.on_surface(surface, &control)?.sample(&control)?;
         Solver::default().solve_field(field, &[start.into()], &Stop::Never, &control)
     };
     let maps = [solve(&surfaces[0], start)?, solve(&surfaces[1], twin(start, n))?];

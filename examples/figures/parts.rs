@@ -48,7 +48,7 @@ pub(crate) fn nearest_rings(surface: &NurbsGrid, rows: &[f64]) -> Result<Vec<Opt
     };
     let starts: Vec<_> = rows.iter().map(ring).collect();
     let metric = Metric::Difference(Difference::default());
-    let field = metric.on_surface(surface)?.sample(&control)?;
+    let field = metric.on_surface(surface, &control)?.sample(&control)?;
     Ok(Solver::default().solve_field(field, &starts, &Stop::Never, &control)?.labels())
 }
 
@@ -128,7 +128,8 @@ pub(crate) fn bumps() -> Result<Cut> {
     let options = FitOptions { smoothing: Smoothing::Interpolate, ..FitOptions::default() };
     let surface = HeightSurface::fit(&terrain, &options, &Control::default())?;
     let control = Control::default();
-    let field = Metric::Curvature(Delta::default()).on_surface(&surface)?.sample(&control)?;
+    let field =
+        Metric::Curvature(Delta::default()).on_surface(&surface, &control)?.sample(&control)?;
     let options = SegmentOptions::default();
     let cut = Segmentation::of(&field, &gaussian_ranks(&surface), &options, &control)?;
     Cut::new("bumps", Box::new(surface), cut.levels[0].labels.clone())

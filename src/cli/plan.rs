@@ -104,15 +104,15 @@ impl<'a> Journey<'a> {
     /// The metric of this name on the surface.
     ///
     /// # Errors
-    /// `tensor` without `--tensor`; a start or goal where the metric lets nobody enter.
-    pub(crate) fn field(&self, name: MetricName) -> Result<MetricField<'_>> {
+    /// `tensor` without `--tensor`; a start or goal where the metric lets nobody enter; cancelled.
+    pub(crate) fn field(&self, name: MetricName, control: &Control) -> Result<MetricField<'_>> {
         let modifiers = Modifiers {
             climb_weight: self.args.metric.climb_weight,
             max_slope_deg: self.args.metric.max_slope,
             barrier: self.barrier.clone(),
             cost: self.cost.clone(),
         };
-        let field = self.metric(name)?.on(&self.surface, &modifiers)?;
+        let field = self.metric(name)?.on(&self.surface, &modifiers, control)?;
         for spot in self.starts.iter().chain(&self.goals) {
             let why = match (name, self.args.metric.max_slope) {
                 _ if self.cost.is_some() => {

@@ -493,7 +493,7 @@ mod tests {
                         let cost = (0..53 * 37).map(|i| 1.5 + (i as f32).cos()).collect();
                         let cost = (climb_weight > 0.0).then_some(cost);
                         let modifiers = Modifiers { climb_weight, cost, ..Modifiers::default() };
-                        let metric = metric.on(&surface, &modifiers).unwrap();
+                        let metric = metric.on(&surface, &modifiers, &Control::default()).unwrap();
                         let difference = difference(&metric);
                         assert!(difference < 1e-6, "{kind:?} {} {difference:e}", metric.name());
                     }

@@ -89,7 +89,7 @@ mod tests {
             HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default()).unwrap();
         for metric in [Metric::Isotropic, Metric::Curvature(Default::default())] {
             let modifiers = Modifiers { climb_weight: 20.0, ..Modifiers::default() };
-            let field = metric.on(&surface, &modifiers).unwrap();
+            let field = metric.on(&surface, &modifiers, &Control::default()).unwrap();
             let mut speeds = SpeedBlock::default();
             field.block_speeds(16, 16, &mut speeds);
             for row in 0..BLOCK {

@@ -19,6 +19,7 @@
 //! `√2 sκ` per length.
 
 use std::mem;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use rayon::prelude::*;
@@ -137,7 +138,8 @@ impl Difference {
             },
         );
         let tensors = tensors.into();
-        Ok(Speed::Difference { form: self.form, curvature_delta, delta, tensors })
+        let products = changes.iter().map(|change| change.gamma.det()).collect();
+        Ok(Speed::Difference { form: self.form, curvature_delta, delta, tensors, products })
     }
 }
 
@@ -289,6 +291,9 @@ fn norm(a: DMat3) -> f64 {
     (a.x_axis.length_squared() + a.y_axis.length_squared() + a.z_axis.length_squared()).sqrt()
 }
 
+/// What progress calls it.
+const STAGE: &str = "comparing curvature";
+
 /// Rows that one thread takes in turn: two more are evaluated for each band.
 const BAND: usize = 32;
 
@@ -307,6 +312,7 @@ fn at_nodes<T: Clone + Default + Send>(
         jets.iter().enumerate().map(node).collect()
     };
     let mut values = vec![T::default(); cols * rows];
+    let (bands, done) = (rows.div_ceil(BAND), AtomicUsize::new(0));
     values.par_chunks_mut(cols.max(1) * BAND).enumerate().for_each(|(band, values)| {
         let first = band * BAND;
         let mut before = beside(first, rows, down)[1].map(load);
@@ -325,8 +331,11 @@ fn at_nodes<T: Clone + Default + Send>(
             }
             before = Some(mem::replace(&mut here, after.unwrap_or_default()));
         }
+        let done = done.fetch_add(1, Ordering::Relaxed);
+        control.report(STAGE, done as f64 / bands as f64);
     });
     control.check()?;
+    control.report(STAGE, 1.0);
     Ok(values)
 }
 
@@ -340,13 +349,15 @@ fn beside(i: usize, count: usize, periodic: bool) -> [Option<usize>; 2] {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
+    use std::sync::Arc;
 
     use glam::DVec3;
 
     use super::DifferenceForm::{Literal, Rate};
     use super::*;
     use crate::{
-        Crs, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers, Smoothing, Terrain,
+        CancelToken, Crs, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers,
+        Smoothing, Terrain,
     };
 
     /// The surface of a formula, whose parameters are `origin` at node (0, 0) and change by `steps` per column and per row.
@@ -583,7 +594,9 @@ mod tests {
         let tensors = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let field = |surface: &dyn ParametricSurface| {
-                let metric = Metric::Difference(Difference::default()).on_surface(surface).unwrap();
+                let metric = Metric::Difference(Difference::default())
+                    .on_surface(surface, &Control::default())
+                    .unwrap();
                 let at = |i: usize| metric.speed(DVec2::new((i % 77) as f64, (i / 77) as f64));
                 (0..77 * 77).map(|i| at(i).unwrap()).collect::<Vec<_>>()
             };
@@ -609,7 +622,7 @@ mod tests {
             let surface =
                 fitted(scale, |x, y| 90.0 * (0.3 * x).sin() + 60.0 * (0.2 * y + 0.1 * x).cos());
             let metric = Metric::Difference(Difference { form, ..Difference::default() });
-            let field = metric.on(&surface, &Modifiers::default()).unwrap();
+            let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             assert!(field.difference_delta().unwrap() > 0.0 && field.delta().unwrap() > 0.0);
             (0..41).map(|i| field.speed(DVec2::new(f64::from(i), 0.7 * f64::from(i)))).collect()
         };
@@ -626,12 +639,36 @@ mod tests {
         let surface = fitted(1.0, |x, y| 3.0 * x - 7.0 * y + 500.0);
         for form in [Rate, Literal] {
             let metric = Metric::Difference(Difference { form, ..Difference::default() });
-            let field = metric.on(&surface, &Modifiers::default()).unwrap();
-            let geodesic = Metric::Isotropic.on(&surface, &Modifiers::default()).unwrap();
+            let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
+            let geodesic =
+                Metric::Isotropic.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let at = DVec2::new(3.4, 17.0);
             let delta = field.difference_delta().unwrap();
             assert!(error(field.speed(at) * delta, geodesic.speed(at)) < 1e-6, "{form:?}");
         }
+    }
+
+    #[test]
+    fn binding_can_be_cancelled() {
+        let cancelled = |control: &Control| {
+            let (metric, surface) = (Metric::Difference(Difference::default()), square(150, hills));
+            let in_space = metric.on_surface(&surface, control);
+            assert!(matches!(in_space, Err(Error::Cancelled)));
+            let surface = fitted(1.0, |x, y| x * y);
+            let on_ground = metric.on(&surface, &Modifiers::default(), control);
+            assert!(matches!(on_ground, Err(Error::Cancelled)));
+        };
+        let control = Control::default();
+        control.cancel.cancel();
+        cancelled(&control);
+        // In the middle.
+        let cancel = CancelToken::default();
+        let asked = cancel.clone();
+        let progress = move |_: &str, done: f64| {
+            assert!((0.0..1.0).contains(&done));
+            asked.cancel();
+        };
+        cancelled(&Control { cancel, progress: Some(Arc::new(progress)) });
     }
 
     #[test]
@@ -642,7 +679,10 @@ mod tests {
             let default = Difference::default();
             let own = Metric::Difference(Difference { delta: bad, ..default });
             let inner = Metric::Difference(Difference { curvature_delta: bad, ..default });
-            assert!(own.on(&surface, &none).is_err() && inner.on(&surface, &none).is_err());
+            assert!(
+                own.on(&surface, &none, &Control::default()).is_err()
+                    && inner.on(&surface, &none, &Control::default()).is_err()
+            );
         }
     }
 }

@@ -130,8 +130,17 @@ pub struct MetricField<'a> {
 #[derive(Clone, Debug)]
 enum Speed {
     Isotropic,
-    Curvature { delta: f64 },
-    Difference { form: DifferenceForm, curvature_delta: f64, delta: f64, tensors: Arc<[Sym2]> },
+    Curvature {
+        delta: f64,
+    },
+    Difference {
+        form: DifferenceForm,
+        curvature_delta: f64,
+        delta: f64,
+        tensors: Arc<[Sym2]>,
+        /// `γ1 γ2` at the nodes.
+        products: Arc<[f64]>,
+    },
     Tensor(Arc<[Sym2]>),
 }
 
@@ -141,6 +150,14 @@ impl Speed {
         match self {
             Self::Isotropic | Self::Curvature { .. } => None,
             Self::Difference { tensors, .. } | Self::Tensor(tensors) => Some(tensors),
+        }
+    }
+
+    /// `γ1 γ2` at the nodes, row-major, on the difference metric.
+    fn gamma_products(&self) -> Option<&[f64]> {
+        match self {
+            Self::Difference { products, .. } => Some(products),
+            _ => None,
         }
     }
 
@@ -159,11 +176,12 @@ impl Metric {
     ///
     /// # Errors
     /// A `δ`, climb weight or slope out of range; a raster whose size is not the surface's; a tensor that
-    /// is finite but not positive definite; a cost that is finite but not positive, or costs too far apart.
+    /// is finite but not positive definite; a cost that is finite but not positive, or costs too far apart; cancelled.
     pub fn on<'a>(
         &self,
         surface: &'a HeightSurface,
         modifiers: &Modifiers,
+        control: &Control,
     ) -> Result<MetricField<'a>> {
         let speed = match self {
             Self::Isotropic => Speed::Isotropic,
@@ -175,7 +193,7 @@ impl Metric {
                 let frame = surface.frame();
                 let ground = |row: usize| frame.spacing(row as f64) * DVec2::new(1.0, -1.0);
                 let scale = (surface.rms_curvature(), extent(surface));
-                difference.speed(surface, scale, ground, &Control::default())?
+                difference.speed(surface, scale, ground, control)?
             }
             Self::Tensor(tensors) => {
                 check_tensors(surface, tensors)?;
@@ -349,6 +367,11 @@ impl<'a> MetricField<'a> {
             Speed::Difference { delta, .. } => Some(delta),
             _ => None,
         }
+    }
+
+    /// `γ1 γ2` of the difference tensor at the nodes, row-major; `None` on other metrics.
+    pub(crate) fn gamma_products(&self) -> Option<&[f64]> {
+        self.speed.gamma_products()
     }
 
     /// Whether the node may be entered: no void, no barrier, not too steep.

@@ -21,8 +21,12 @@ impl Metric {
     /// without curvature it is the inverse of the square root of the area.
     ///
     /// # Errors
-    /// A `δ` out of range; tensors that are not one per node or not positive definite.
-    pub fn on_surface<'a>(&self, surface: &'a dyn ParametricSurface) -> Result<SurfaceMetric<'a>> {
+    /// A `δ` out of range; tensors that are not one per node or not positive definite; cancelled.
+    pub fn on_surface<'a>(
+        &self,
+        surface: &'a dyn ParametricSurface,
+        control: &Control,
+    ) -> Result<SurfaceMetric<'a>> {
         let speed = match self {
             Self::Isotropic => Speed::Isotropic,
             Self::Curvature(delta) => {
@@ -33,7 +37,7 @@ impl Metric {
             Self::Difference(difference) => {
                 let measures = surface.measures();
                 let scale = (measures.rms_curvature, measures.area.sqrt());
-                difference.speed(surface, scale, |_| DVec2::ONE, &Control::default())?
+                difference.speed(surface, scale, |_| DVec2::ONE, control)?
             }
             Self::Tensor(tensors) => {
                 check_tensors(surface, tensors)?;
@@ -61,6 +65,11 @@ impl<'a> SurfaceMetric<'a> {
     #[must_use]
     pub fn delta(&self) -> Option<f64> {
         self.speed.delta()
+    }
+
+    /// `γ1 γ2` of the difference tensor at the nodes, row-major; `None` on other metrics.
+    pub(crate) fn gamma_products(&self) -> Option<&[f64]> {
+        self.speed.gamma_products()
     }
 
     /// `D` at grid coordinates; `None` where the surface is degenerate.
@@ -187,8 +196,8 @@ mod tests {
         for surface in surfaces() {
             let difference = Metric::Difference(Default::default());
             for metric in [Metric::Isotropic, Metric::Curvature(Delta::default()), difference] {
-                let fast = metric.on(&surface, &Modifiers::default()).unwrap();
-                let general = metric.on_surface(&surface).unwrap();
+                let fast = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
+                let general = metric.on_surface(&surface, &Control::default()).unwrap();
                 assert_eq!((fast.unit(), fast.delta()), (general.unit(), general.delta()));
                 for at in [DVec2::new(3.0, 4.0), DVec2::new(20.3, 11.7), DVec2::new(39.0, 29.0)] {
                     let (a, b) = (fast.grid_metric(at), general.grid_metric(at));
@@ -210,11 +219,20 @@ mod tests {
                     assert!(a == b || (a - b).abs() < 1e-4 * b, "{metric:?}: {a} {b}");
                 }
             }
-            let general = Metric::Tensor(tensors.clone()).on_surface(&surface).unwrap();
+            let general =
+                Metric::Tensor(tensors.clone()).on_surface(&surface, &Control::default()).unwrap();
             let d = general.speed(DVec2::new(3.5, 4.0)).unwrap();
             assert!((d.xx - 0.5 * (tensors[163].xx + tensors[164].xx)).abs() < 1e-12);
-            assert!(Metric::Tensor(tensors[1..].into()).on_surface(&surface).is_err());
-            assert!(Metric::Curvature(Delta::Auto(-1.0)).on_surface(&surface).is_err());
+            assert!(
+                Metric::Tensor(tensors[1..].into())
+                    .on_surface(&surface, &Control::default())
+                    .is_err()
+            );
+            assert!(
+                Metric::Curvature(Delta::Auto(-1.0))
+                    .on_surface(&surface, &Control::default())
+                    .is_err()
+            );
         }
     }
 }

@@ -4,7 +4,8 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::eikonal::TensorField;
-use crate::{Control, DistanceMap, Error, Metric, ParametricSurface, Result, Solver, Stop};
+use crate::metric::SurfaceMetric;
+use crate::{Control, DistanceMap, Error, MetricField, ParametricSurface, Result, Solver, Stop};
 
 /// Half the side of the window in which the first cluster is solved, in nodes.
 const REACH: usize = 24;
@@ -23,19 +24,21 @@ pub fn gaussian_ranks(surface: &dyn ParametricSurface) -> Vec<f64> {
     (0..surface.rows()).into_par_iter().flat_map_iter(of_row).collect()
 }
 
-/// What the nodes are ranked by as seeds under a metric, row-major: `γ1 γ2` on the difference metric, which is least where the shape
-/// changes least, [`gaussian_ranks`] on the others. Cost: one evaluation of the surface per node; as to bind the difference metric.
-///
-/// # Errors
-/// A `δ` of the curvature tensor out of range; cancelled.
-pub fn seed_ranks(
-    surface: &dyn ParametricSurface,
-    metric: &Metric,
-    control: &Control,
-) -> Result<Vec<f64>> {
-    let Metric::Difference(difference) = metric else { return Ok(gaussian_ranks(surface)) };
-    let changes = difference.changes(surface, control)?;
-    Ok(changes.iter().map(|change| change.gamma.det()).collect())
+impl MetricField<'_> {
+    /// What the nodes are ranked by as seeds, row-major: `γ1 γ2` on the difference metric, which is least where the shape changes
+    /// least and known since the metric was bound; [`gaussian_ranks`] on the others.
+    #[must_use]
+    pub fn seed_ranks(&self) -> Vec<f64> {
+        self.gamma_products().map_or_else(|| gaussian_ranks(self.surface()), <[f64]>::to_vec)
+    }
+}
+
+impl SurfaceMetric<'_> {
+    /// What the nodes are ranked by as seeds, as [`MetricField::seed_ranks`].
+    #[must_use]
+    pub fn seed_ranks(&self) -> Vec<f64> {
+        self.gamma_products().map_or_else(|| gaussian_ranks(self.surface()), <[f64]>::to_vec)
+    }
 }
 
 /// The cluster `D_ε(p)`: the open nodes within `epsilon` (unit of the metric) of a node, as places in the row-major grid, each with its

@@ -16,7 +16,7 @@ mod segmentation;
 mod signature;
 mod statistics;
 
-pub use self::clusters::{cluster, gaussian_ranks, seed_ranks};
+pub use self::clusters::{cluster, gaussian_ranks};
 pub use self::matching::{Match, matches, matches_within};
 pub use self::outline::{Polygon, outlines};
 pub use self::segmentation::{Level, Region, SegmentOptions, Segmentation};

@@ -82,7 +82,7 @@ pub struct Segmentation {
 
 impl Segmentation {
     /// Cuts the open nodes of a field. Seeds are taken in ascending order of `ranks`, one for each node, row-major:
-    /// [`seed_ranks`](super::seed_ranks) gives them.
+    /// [`MetricField::seed_ranks`](crate::MetricField::seed_ranks) gives them.
     ///
     /// # Cost
     /// Some 1 µs of one core per node and level, with its ranks; 0.16 ms and 3 kB per region. `docs/regions.md` has measurements.

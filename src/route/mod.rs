@@ -95,7 +95,7 @@ mod tests {
         for (metric, shorter) in
             [(Metric::Isotropic, 1e-4), (Metric::Curvature(Default::default()), 0.01)]
         {
-            let field = metric.on(&surface, &Modifiers::default()).unwrap();
+            let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let start = DVec2::new(100.0, 160.0);
             let distance =
                 Solver::default().solve(&field, &[start.into()], &Stop::Never, &control).unwrap();

@@ -31,7 +31,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     };
     let fields = metrics(args, &journey)
         .into_iter()
-        .map(|name| journey.field(name))
+        .map(|name| journey.field(name, control))
         .collect::<Result<Vec<_>>>()?;
     let comparison = Comparison::between(
         args.ground.metric.solver(),

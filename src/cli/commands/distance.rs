@@ -32,7 +32,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     let places = (&args.start.start[..], &args.goal[..]);
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
-    let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
+    let field = journey.field(args.metric.unwrap_or(journey.default_metric()), control)?;
     let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
     let map = journey.solve(&field, &stop)?;
     let provenance = journey.provenance(std::slice::from_ref(&field));

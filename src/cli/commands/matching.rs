@@ -85,7 +85,7 @@ impl<'a> Subject<'a> {
         control: &'a Control,
     ) -> Result<Self> {
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let (ground, metric, field) = if is_json {
+        let (ground, ranks, field) = if is_json {
             if let Some(flag) = args.ground.metric.of_dems() {
                 let name = path.display();
                 return Err(Error::usage(format!("{flag} is for DEMs, and {name} is none")));
@@ -94,18 +94,20 @@ impl<'a> Subject<'a> {
             let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
             let metric =
                 args.ground.metric.metric(args.metric.unwrap_or(MetricName::Curvature), None)?;
-            let field = metric.on_surface(&surface)?.sample(control)?;
-            (Ground::Nurbs(Box::new(surface)), metric, field)
+            let metric = metric.on_surface(&surface, control)?;
+            let (ranks, field) = (metric.seed_ranks(), metric.sample(control)?);
+            (Ground::Nurbs(Box::new(surface)), ranks, field)
         } else {
             let journey = Journey::prepare(path, (&[], &[]), &args.ground, run, control)?;
             let name = args.metric.unwrap_or(journey.default_metric());
-            let field = TensorField::sample(&journey.field(name)?, control)?;
-            let metric = journey.metric(name)?;
-            (Ground::Heights(Box::new(journey)), metric, field)
+            let metric = journey.field(name, control)?;
+            let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
+            drop(metric);
+            (Ground::Heights(Box::new(journey)), ranks, field)
         };
         let surface = ground.surface();
         let (regions, solver) = (&args.regions, args.ground.metric.solver());
-        let mut levels = cut(surface, field, &metric, regions, solver, control)?.levels;
+        let mut levels = cut(surface, field, ranks, regions, solver, control)?.levels;
         let level = levels.pop().unwrap_or_default();
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
         Ok(Self { path, ground, level, signatures })

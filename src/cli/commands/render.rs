@@ -60,7 +60,7 @@ fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> R
 fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
     let places = (&args.start[..], &args.goal[..]);
     let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
-    let fields = [journey.field(args.metric.unwrap_or(journey.default_metric()))?];
+    let fields = [journey.field(args.metric.unwrap_or(journey.default_metric()), control)?];
     let distances = [journey.solve(&fields[0], &Stop::Never)?];
     let routes = journey
         .goals

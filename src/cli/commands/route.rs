@@ -24,7 +24,7 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
     let places = (&args.start.start[..], &args.goal[..]);
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
-    let field = journey.field(args.metric.unwrap_or(journey.default_metric()))?;
+    let field = journey.field(args.metric.unwrap_or(journey.default_metric()), control)?;
     let map = journey.solve(&field, &journey.all_goals())?;
     let to_goal = |goal: &Spot| {
         control.check()?;

@@ -3,11 +3,11 @@
 use ridgeway::eikonal::TensorField;
 use ridgeway::export::{Samples, regions_geojson};
 use ridgeway::region::{
-    Level, Neighbours, Polygon, RegionStatistics, Segmentation, Signature, outlines, seed_ranks,
-    signatures, statistics,
+    Level, Neighbours, Polygon, RegionStatistics, Segmentation, Signature, outlines, signatures,
+    statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
-use ridgeway::{Control, HeightSurface, Metric, MetricField, ParametricSurface, Result, Solver};
+use ridgeway::{Control, HeightSurface, MetricField, ParametricSurface, Result, Solver};
 use serde_json::{Map, Value, json};
 
 use super::render::title;
@@ -33,11 +33,11 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         journey = journey.without_heights();
     }
     let name = args.metric.unwrap_or(journey.default_metric());
-    let metric = journey.field(name)?;
+    let metric = journey.field(name, control)?;
     let field = TensorField::sample(&metric, control)?;
-    let kind = journey.metric(name)?;
+    let ranks = metric.seed_ranks();
     let (regions, solver) = (&args.regions, args.ground.metric.solver());
-    let segmentation = cut(&journey.surface, field, &kind, regions, solver, control)?;
+    let segmentation = cut(&journey.surface, field, ranks, regions, solver, control)?;
     let measures = measures(&segmentation, &journey.surface, control)?;
     let outcome = Outcome { journey: &journey, metric: &metric, segmentation, measures };
     control.check()?;
@@ -62,19 +62,18 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     Report { text: outcome.text() + &written, json }.print(run)
 }
 
-/// Cuts a surface, on which `field` is the metric, as the flags ask.
+/// Cuts a surface, on which `field` is the metric, by seeds in the order of their `ranks`, as the flags ask.
 ///
 /// # Errors
 /// Radii that do not fall; too many or no regions; cancelled.
 pub(super) fn cut(
     surface: &dyn ParametricSurface,
     field: TensorField,
-    metric: &Metric,
+    ranks: Vec<f64>,
     regions: &RegionArgs,
     solver: Solver,
     control: &Control,
 ) -> Result<Segmentation> {
-    let ranks = seed_ranks(surface, metric, control)?;
     let mut segmentation = Segmentation::of(&field, &ranks, &regions.options(solver), control)?;
     drop((field, ranks));
     if let Some(tolerance) = regions.merge {

@@ -266,7 +266,7 @@ proptest! {
         let again = NurbsSurface::from_json(&surface.to_json()).unwrap();
         prop_assert!(again.jet(DVec2::ONE).point.distance(surface.jet(DVec2::ONE).point) < 1e-12);
         let grid = surface.on_grid(5, 4).unwrap();
-        let metric = Metric::Curvature(Default::default()).on_surface(&grid).unwrap();
+        let metric = Metric::Curvature(Default::default()).on_surface(&grid, &Control::default()).unwrap();
         metric.sample(&Control::default()).unwrap();
     }
 }
