@@ -1,11 +1,12 @@
 //! Jets of many nodes of any surface, laid out for wide registers.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::SurfaceJet;
-use super::block::Lanes;
+use super::block::{BLOCK, JetBlock, Lanes};
+use super::parametric::on_ground;
 
-/// Derivatives at [`BLOCK`](super::BLOCK) nodes: those of a [`SurfaceJet`] side by side, without the points.
+/// Derivatives at [`BLOCK`] nodes: those of a [`SurfaceJet`] side by side, without the points.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SurfaceJets {
     first: [[Lanes; 3]; 2],
@@ -13,15 +14,27 @@ pub(crate) struct SurfaceJets {
 }
 
 impl SurfaceJets {
-    /// Takes the jets of some nodes, at most [`BLOCK`](super::BLOCK); what is there of others means nothing.
+    /// Takes the jets of some nodes, at most [`BLOCK`]; what is there of others means nothing.
     pub(crate) fn load(&mut self, jets: &[SurfaceJet]) {
-        for (i, jet) in jets.iter().enumerate() {
-            let set = |lanes: &mut [Lanes; 3], s: DVec3| {
-                [lanes[0][i], lanes[1][i], lanes[2][i]] = s.to_array();
-            };
-            self.first.iter_mut().zip(jet.first).for_each(|(lanes, s)| set(lanes, s));
-            self.second.iter_mut().zip(jet.second).for_each(|(lanes, s)| set(lanes, s));
+        for (i, jet) in jets.iter().enumerate().take(BLOCK) {
+            self.set(i, jet);
         }
+    }
+
+    /// Takes the jets of a row of a block of heights, whose nodes are `spacing` metres apart.
+    pub(crate) fn load_heights(&mut self, jets: &JetBlock, row: usize, spacing: DVec2) {
+        for i in 0..BLOCK {
+            self.set(i, &on_ground(DVec2::ZERO, spacing, &jets.jet(row, i)));
+        }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, jet: &SurfaceJet) {
+        let set = |lanes: &mut [Lanes; 3], s: DVec3| {
+            [lanes[0][i], lanes[1][i], lanes[2][i]] = s.to_array();
+        };
+        self.first.iter_mut().zip(jet.first).for_each(|(lanes, s)| set(lanes, s));
+        self.second.iter_mut().zip(jet.second).for_each(|(lanes, s)| set(lanes, s));
     }
 
     /// The jet of node `i`, with the point at the origin.

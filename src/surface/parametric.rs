@@ -34,6 +34,12 @@ pub trait ParametricSurface: Sync {
     /// `S` and its derivatives by the grid coordinates at `at`.
     fn space_jet(&self, at: DVec2) -> SurfaceJet;
 
+    /// The surface as one of heights, if it is one: such are evaluated faster.
+    #[doc(hidden)]
+    fn as_heights(&self) -> Option<&HeightSurface> {
+        None
+    }
+
     /// Jets at all nodes of a row.
     fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
         (0..self.cols()).map(|col| self.space_jet(DVec2::new(col as f64, row as f64))).collect()
@@ -194,6 +200,10 @@ impl ParametricSurface for HeightSurface {
         on_ground(at, self.frame().spacing(at.y), &self.jet(at))
     }
 
+    fn as_heights(&self) -> Option<&HeightSurface> {
+        Some(self)
+    }
+
     /// The means are those of [`rms_curvature`](Self::rms_curvature), over the map.
     fn measures(&self) -> Measures {
         let area = measured(self, |_, _| true).area;
@@ -210,7 +220,8 @@ impl ParametricSurface for HeightSurface {
 }
 
 /// A jet in space, from one along the ground axes where nodes are `x` by `y` metres apart.
-fn on_ground(at: DVec2, DVec2 { x, y }: DVec2, jet: &HeightJet) -> SurfaceJet {
+#[inline(always)]
+pub(super) fn on_ground(at: DVec2, DVec2 { x, y }: DVec2, jet: &HeightJet) -> SurfaceJet {
     let up = |z: f64| DVec3::new(0.0, 0.0, z);
     SurfaceJet {
         point: DVec3::new(at.x * x, -at.y * y, jet.z),

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::surface::{BLOCK, Lanes, SurfaceJets};
+use crate::surface::{BLOCK, JetBlock, Lanes, SurfaceJets};
 use crate::{Control, ParametricSurface, Result};
 
 /// A surface cut into regions.
@@ -41,16 +41,38 @@ impl Run<'_> {
 }
 
 impl Cut<'_> {
-    /// Goes along a row.
-    pub(super) fn along(&self, row: usize, mut visit: impl FnMut(&Run<'_>)) {
-        let jets = self.surface.row_space_jets(row);
-        let labels = &self.labels[row * self.cols..][..self.cols];
-        let mut run = Run { node: [0, row], labels, jets: SurfaceJets::default() };
-        for (jets, labels) in jets.chunks(BLOCK).zip(labels.chunks(BLOCK)) {
-            run.labels = labels;
-            run.jets.load(jets);
-            visit(&run);
-            run.node[0] += BLOCK;
+    /// Goes through the nodes of [`BLOCK`] rows, run by run: from left to right in each row.
+    pub(super) fn visit(&self, first: usize, control: &Control, mut visit: impl FnMut(&Run<'_>)) {
+        let rows = first..self.rows.min(first + BLOCK);
+        let mut run = Run { node: [0; 2], labels: &[], jets: SurfaceJets::default() };
+        let labels = |[col, row]: [usize; 2]| {
+            &self.labels[row * self.cols..][col..self.cols.min(col + BLOCK)]
+        };
+        if let Some(heights) = self.surface.as_heights() {
+            let mut block = JetBlock::default();
+            for col in (0..self.cols).step_by(BLOCK) {
+                if control.cancel.is_cancelled() {
+                    return;
+                }
+                heights.block_jets(col, first, &mut block);
+                for row in rows.clone() {
+                    (run.node, run.labels) = ([col, row], labels([col, row]));
+                    run.jets.load_heights(&block, row - first, heights.frame().spacing(row as f64));
+                    visit(&run);
+                }
+            }
+            return;
+        }
+        for row in rows {
+            if control.cancel.is_cancelled() {
+                return;
+            }
+            let jets = self.surface.row_space_jets(row);
+            for (col, jets) in (0..self.cols).step_by(BLOCK).zip(jets.chunks(BLOCK)) {
+                (run.node, run.labels) = ([col, row], labels([col, row]));
+                run.jets.load(jets);
+                visit(&run);
+            }
         }
     }
 
@@ -61,14 +83,12 @@ impl Cut<'_> {
         control: &Control,
         values: impl Fn(&Run<'_>, &mut [T; BLOCK]) + Sync,
     ) -> Result<Vec<T>> {
-        let of_row = |row: usize| {
-            let mut sums: Vec<(u32, T)> = Vec::new();
-            if control.cancel.is_cancelled() {
-                return sums;
-            }
+        let of_band = |band: usize| {
+            let mut rows: [Vec<(u32, T)>; BLOCK] = Default::default();
             let mut room = std::array::from_fn(|_| T::default());
-            self.along(row, |run| {
+            self.visit(band * BLOCK, control, |run| {
                 values(run, &mut room);
+                let sums = &mut rows[run.node[1] % BLOCK];
                 for (value, label) in room.iter().zip(run.labels) {
                     let Some(region) = *label else { continue };
                     // Neighbours along a row are mostly of one region.
@@ -78,12 +98,13 @@ impl Cut<'_> {
                     }
                 }
             });
-            sums
+            rows
         };
-        let rows: Vec<_> = (0..self.rows).into_par_iter().map(of_row).collect();
+        let bands = self.rows.div_ceil(BLOCK);
+        let bands: Vec<_> = (0..bands).into_par_iter().map(of_band).collect();
         control.check()?;
         let mut sums = vec![T::default(); self.regions];
-        for (region, sum) in rows.iter().flatten() {
+        for (region, sum) in bands.iter().flatten().flatten() {
             sums[*region as usize].add(sum);
         }
         Ok(sums)

@@ -44,13 +44,11 @@ pub(super) struct Tensors<'a> {
 impl<'a> Tensors<'a> {
     pub(super) fn new(cut: &'a Cut<'a>, sizes: &[Size], control: &Control) -> Result<Self> {
         let mut of = vec![[0.0; 6]; cut.labels.len()];
-        of.par_chunks_mut(cut.cols.max(1)).enumerate().for_each(|(row, of)| {
-            if control.cancel.is_cancelled() {
-                return;
-            }
-            cut.along(row, |run| {
+        of.par_chunks_mut(cut.cols.max(1) * BLOCK).enumerate().for_each(|(band, of)| {
+            cut.visit(band * BLOCK, control, |run| {
                 let deltas = run.of_regions(|region| sizes[region].delta);
-                curvature_tensors(run, &deltas, &mut of[run.node[0]..][..run.labels.len()]);
+                let first = run.node[1] % BLOCK * cut.cols + run.node[0];
+                curvature_tensors(run, &deltas, &mut of[first..][..run.labels.len()]);
             });
         });
         control.check()?;
