@@ -19,6 +19,7 @@
 //! `√2 sκ` per length.
 
 use std::mem;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -127,19 +128,25 @@ impl Difference {
             Delta::Auto(_) => offset(surface, self.form, &changes, own),
         };
         let mut tensors = vec![Sym2::default(); changes.len()];
+        let mut products = vec![0.0; changes.len()];
         let cols = surface.cols().max(1);
-        tensors.par_chunks_mut(cols).zip(changes.par_chunks(cols)).enumerate().for_each(
-            |(row, (tensors, changes))| {
+        let rows = changes.par_chunks(cols).zip(tensors.par_chunks_mut(cols));
+        rows.zip(products.par_chunks_mut(cols)).enumerate().for_each(
+            |(row, ((changes, tensors), products))| {
+                if control.cancel.is_cancelled() {
+                    return;
+                }
                 let (jets, by) = (surface.row_space_jets(row), stretch(row));
-                for ((tensor, change), jet) in tensors.iter_mut().zip(changes).zip(&jets) {
+                for (i, (change, jet)) in changes.iter().zip(&jets).enumerate() {
                     let inverse = (change.gamma + Sym2::new(delta, 0.0, delta)).inverse();
-                    *tensor = Frame::of(jet.first_form()).to_grid(inverse).stretched(by);
+                    tensors[i] = Frame::of(jet.first_form()).to_grid(inverse).stretched(by);
+                    products[i] = change.gamma.det();
                 }
             },
         );
-        let tensors = tensors.into();
-        let products = changes.iter().map(|change| change.gamma.det()).collect();
-        Ok(Speed::Difference { form: self.form, curvature_delta, delta, tensors, products })
+        control.check()?;
+        let nodes = Arc::new((tensors, products));
+        Ok(Speed::Difference { form: self.form, curvature_delta, delta, nodes })
     }
 }
 
@@ -349,7 +356,6 @@ fn beside(i: usize, count: usize, periodic: bool) -> [Option<usize>; 2] {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::{FRAC_PI_2, PI, SQRT_2};
-    use std::sync::Arc;
 
     use glam::DVec3;
 

@@ -137,9 +137,8 @@ enum Speed {
         form: DifferenceForm,
         curvature_delta: f64,
         delta: f64,
-        tensors: Arc<[Sym2]>,
-        /// `γ1 γ2` at the nodes.
-        products: Arc<[f64]>,
+        /// `D` and `γ1 γ2` at the nodes.
+        nodes: Arc<(Vec<Sym2>, Vec<f64>)>,
     },
     Tensor(Arc<[Sym2]>),
 }
@@ -149,14 +148,15 @@ impl Speed {
     fn tensors(&self) -> Option<&[Sym2]> {
         match self {
             Self::Isotropic | Self::Curvature { .. } => None,
-            Self::Difference { tensors, .. } | Self::Tensor(tensors) => Some(tensors),
+            Self::Difference { nodes, .. } => Some(&nodes.0),
+            Self::Tensor(tensors) => Some(tensors),
         }
     }
 
     /// `γ1 γ2` at the nodes, row-major, on the difference metric.
     fn gamma_products(&self) -> Option<&[f64]> {
         match self {
-            Self::Difference { products, .. } => Some(products),
+            Self::Difference { nodes, .. } => Some(&nodes.1),
             _ => None,
         }
     }
@@ -429,8 +429,8 @@ impl<'a> MetricField<'a> {
         let speed = match &self.speed {
             Speed::Isotropic => curvature::isotropic(jet),
             Speed::Curvature { delta } => curvature::curvature(jet, *delta),
-            Speed::Difference { tensors, .. } | Speed::Tensor(tensors) => {
-                let d = tensor(tensors);
+            Speed::Difference { .. } | Speed::Tensor(_) => {
+                let d = self.speed.tensors().map(tensor).unwrap_or_default();
                 (d, d.det())
             }
         };

@@ -112,7 +112,8 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::{SurfaceJet, Sym2};
+    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
+    use crate::{Crs, FitOptions, HeightSurface, SurfaceJet, Sym2};
 
     /// Two bumps and a dent over the unit disc, size `scale`, seen through the parameters `x = φ(u)`.
     #[derive(Clone, Copy, Debug)]
@@ -288,6 +289,44 @@ mod tests {
     ) -> Vec<Signature> {
         let labels: Vec<_> = (0..surface.cols() * surface.rows()).map(label).collect();
         signatures(surface, &labels, Neighbours::Surface, &Control::default()).unwrap()
+    }
+
+    /// A height surface that does not say that it is one.
+    struct Unsaid(HeightSurface);
+
+    impl ParametricSurface for Unsaid {
+        fn cols(&self) -> usize {
+            self.0.cols()
+        }
+
+        fn rows(&self) -> usize {
+            self.0.rows()
+        }
+
+        fn space_jet(&self, at: DVec2) -> SurfaceJet {
+            self.0.space_jet(at)
+        }
+    }
+
+    #[test]
+    fn neither_threads_nor_blocks_of_heights_change_anything() {
+        let range = Synthetic::new(SyntheticKind::Range, 75, 53, 30.0).unwrap();
+        let terrain = range.terrain(Crs::none(), DVec2::ZERO).unwrap();
+        let control = Control::default();
+        let heights = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
+        let label = |i: usize| {
+            let (col, row) = (i % 75, i / 75);
+            (col + row > 20).then(|| ((col + row / 3) / 40 + 2 * (row / 30)) as u32)
+        };
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| of_all(&heights, label))
+        };
+        let one = with(1);
+        assert!([2, 5].into_iter().all(|threads| with(threads) == one));
+        for (block, single) in one.iter().zip(of_all(&Unsaid(heights), label)) {
+            assert!(change(*block, single) < 1e-9, "{block:?} {single:?}");
+        }
     }
 
     #[test]

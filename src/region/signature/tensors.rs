@@ -172,3 +172,33 @@ fn curvature_tensor(jet: &SurfaceJet, delta: f64) -> Tensor {
     let twice = |i, j| std::f64::consts::SQRT_2 * entry(i, j);
     [entry(0, 0), entry(1, 1), entry(2, 2), twice(1, 2), twice(0, 2), twice(0, 1)]
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::surface::SurfaceJets;
+
+    #[test]
+    fn wide_registers_change_no_bit() {
+        let jet = |i: usize| {
+            let at = |k: usize| (1.7 * (7 * i + k) as f64).sin();
+            let vector = |k: usize| DVec3::new(at(k), at(k + 1), at(k + 2));
+            SurfaceJet {
+                point: DVec3::ZERO,
+                first: [vector(0), vector(3)],
+                second: [vector(6), vector(9), vector(12)],
+            }
+        };
+        let plain: Vec<SurfaceJet> = (0..BLOCK).map(jet).collect();
+        let mut jets = SurfaceJets::default();
+        jets.load(&plain);
+        let run = Run { node: [0; 2], labels: &[], jets };
+        let mut tensors = [[0.0; 6]; BLOCK];
+        curvature_tensors(&run, &[0.3; BLOCK], &mut tensors);
+        for (tensor, jet) in tensors.iter().zip(&plain) {
+            assert_eq!(*tensor, curvature_tensor(jet, 0.3));
+        }
+    }
+}
