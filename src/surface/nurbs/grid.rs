@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{NurbsSurface, SMALL, size};
+use super::{Basis, NurbsSurface, SMALL, size};
 use crate::surface::parametric::{Measures, ParametricSurface, SurfaceJet, measured};
 use crate::{Error, Result};
 
@@ -20,6 +20,8 @@ pub struct NurbsGrid {
     nodes: [usize; 2],
     /// Least and greatest coordinate at which jets are taken, in directions that are not closed.
     bounds: [[f64; 2]; 2],
+    /// The splines of the first parameter at each column.
+    columns: Vec<Basis>,
 }
 
 /// How far inside the jet of a pole is taken, in cells. At ten times as far, distances from a pole are wrong by the length of that ring: on
@@ -50,7 +52,11 @@ impl NurbsSurface {
             let inside = |is_pole: bool| if is_pole { INSIDE } else { 0.0 };
             bounds[axis] = [inside(first), (nodes[axis] - 1) as f64 - inside(last)];
         }
-        Ok(NurbsGrid { surface: self, nodes, bounds })
+        let mut grid = NurbsGrid { surface: self, nodes, bounds, columns: Vec::new() };
+        let surface = &grid.surface;
+        let basis = |u: f64| surface.knots[0].basis(surface.turned(0, u));
+        grid.columns = (0..cols).map(|col| basis(grid.parameter(0, col as f64))).collect();
+        Ok(grid)
     }
 }
 
@@ -128,8 +134,7 @@ impl ParametricSurface for NurbsGrid {
     }
 
     fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
-        let cols = (0..self.nodes[0]).map(|col| self.parameter(0, col as f64));
-        let jets = self.surface.row_jets(cols, self.parameter(1, row as f64));
-        jets.into_iter().map(|jet| self.by_nodes(jet)).collect()
+        let jets = self.surface.row_jets(&self.columns, self.parameter(1, row as f64));
+        jets.map(|jet| self.by_nodes(jet)).collect()
     }
 }

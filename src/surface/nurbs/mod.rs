@@ -116,14 +116,14 @@ impl NurbsSurface {
         self.jet_on(&u1, &self.line(&u2, first..first + self.knots[0].degree() + 1))
     }
 
-    /// Jets along the first parameter, at one value of the second.
-    fn row_jets(&self, u1: impl Iterator<Item = f64>, u2: f64) -> Vec<SurfaceJet> {
+    /// Jets along the first parameter, where its splines are `columns`, at one value of the second.
+    fn row_jets<'a>(
+        &'a self,
+        columns: &'a [Basis],
+        u2: f64,
+    ) -> impl Iterator<Item = SurfaceJet> + 'a {
         let line = self.line(&self.knots[1].basis(self.turned(1, u2)), 0..self.knots[0].controls());
-        let jet = |u| {
-            let basis = self.knots[0].basis(self.turned(0, u));
-            self.jet_on(&basis, &line[basis.first..])
-        };
-        u1.map(jet).collect()
+        columns.iter().map(move |basis| self.jet_on(basis, &line[basis.first..]))
     }
 
     /// In a closed direction the same parameter in the domain.
