@@ -11,7 +11,7 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Those of one vector; none if it is not finite.
+    /// Those of one vector; none if it is not finite or has no weight.
     pub(super) fn of(v: [f64; 4], weight: f64) -> Self {
         Self::weighted(weight, v, v.map(|a| v.map(|b| a * b)))
     }
@@ -29,7 +29,7 @@ impl Moments {
 
     #[inline(always)]
     fn weighted(weight: f64, first: [f64; 4], second: [[f64; 4]; 4]) -> Self {
-        if !first.iter().all(|v| v.is_finite()) {
+        if !(weight > 0.0 && first.iter().all(|v| v.is_finite())) {
             return Self::default();
         }
         let by_weight = |v: [f64; 4]| v.map(|v| weight * v);
