@@ -74,7 +74,7 @@ impl Signature {
 /// say. Neighbours outside the region are missing: where one of two opposite ones is, the other stands for both.
 ///
 /// # Cost
-/// Some 0.4 µs of one core per node, and 48 bytes; on NURBS twice as long.
+/// Some 0.15 µs of one core per node, and 49 bytes; on NURBS 0.25 µs. `docs/matching.md` has measurements.
 ///
 /// # Errors
 /// [`Error::Usage`] if the labels do not fit the surface; [`Error::Cancelled`].
