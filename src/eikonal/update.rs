@@ -100,7 +100,7 @@ pub(super) struct Coefficients {
 
 impl Coefficients {
     /// Nodes that are never updated: all steps are endless.
-    const CLOSED: Self = Self {
+    pub(super) const CLOSED: Self = Self {
         ix: [f32::INFINITY; SIDE],
         ex: [0.0; SIDE],
         bx: [0.0; SIDE],
@@ -156,7 +156,7 @@ pub(crate) struct Bench {
     values: Block,
     by_columns: bool,
     prepared: [Prepared; 2],
-    limits: Limits,
+    limits: LaneLimits,
 }
 
 impl Default for Bench {
@@ -165,7 +165,7 @@ impl Default for Bench {
             values: [[UNREACHED; BLOCK]; BLOCK],
             by_columns: false,
             prepared: Default::default(),
-            limits: Limits::default(),
+            limits: LaneLimits::default(),
         }
     }
 }
@@ -183,12 +183,20 @@ pub(crate) struct Limits {
     pub(crate) longest_step: f32,
 }
 
+/// [`Limits`] of the nodes in each lane; their greatest at once would be a chain of comparisons, one after the other.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LaneLimits {
+    slack: [f32; SIDE],
+    shift: [f32; SIDE],
+    longest_step: [f32; SIDE],
+}
+
 impl Bench {
     /// Room for the values of the next tile.
     pub(crate) fn clear(&mut self) -> &mut Block {
         self.by_columns = false;
         self.prepared.iter_mut().for_each(|side| side.ready = 0);
-        self.limits = Limits::default();
+        self.limits = LaneLimits::default();
         &mut self.values
     }
 
@@ -199,7 +207,9 @@ impl Bench {
     }
 
     pub(crate) fn limits(&self) -> Limits {
-        self.limits
+        let LaneLimits { slack, shift, longest_step } = &self.limits;
+        let all = |lanes: &[f32; SIDE]| lanes.iter().copied().fold(0.0, greatest);
+        Limits { slack: all(slack), shift: all(shift), longest_step: all(longest_step) }
     }
 
     fn turn(&mut self, by_columns: bool) {
@@ -305,11 +315,9 @@ pub(super) fn prepare(
     line: usize,
     how: How,
     k: &mut Coefficients,
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) {
     let [xxs, xys, dets] = tensors(tile, line, how);
-    let mut slack = [0f32; SIDE];
-    let mut longest = [0f32; SIDE];
     for i in 0..SIDE {
         let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
         let open = det > 0.0;
@@ -348,8 +356,9 @@ pub(super) fn prepare(
                 greatest(-k.fx[i] - falling, -k.fy[i] - falling),
             ),
         );
-        slack[i] = choose(open, obtuse, 0.0);
-        longest[i] = choose(open, greatest(rising, falling), 0.0);
+        let longest = greatest(rising, falling);
+        limits.slack[i] = greatest(limits.slack[i], choose(open, obtuse, 0.0));
+        limits.longest_step[i] = greatest(limits.longest_step[i], choose(open, longest, 0.0));
     }
     if let Some(seeds) = tile.seeds {
         for i in 0..SIDE {
@@ -357,10 +366,6 @@ pub(super) fn prepare(
             let shortest = least(least(k.east[i], k.south[i]), least(k.rising[i], k.falling[i]));
             k.ceiling[i] = least(k.ceiling[i], ceiling(seeds[place], shortest));
         }
-    }
-    for i in 0..SIDE {
-        limits.slack = greatest(limits.slack, slack[i]);
-        limits.longest_step = greatest(limits.longest_step, longest[i]);
     }
 }
 
@@ -398,7 +403,7 @@ pub(super) fn pass(diagonal: f32, a: f32, b: f32) -> f32 {
 /// One triangle: the value through the segment from axis neighbour `a` to diagonal neighbour `b`; where the least over
 /// the segment is at an end, not below that.
 #[inline(always)]
-fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
+pub(super) fn triangle(a: f32, b: f32, lo: f32, hi: f32, [i, e, beta]: [f32; 3]) -> f32 {
     let d = greatest(least(b - a, hi), lo);
     let root = i - e * (d * d);
     a + (beta * d + greatest(root, 0.0).sqrt())
@@ -411,7 +416,7 @@ pub(super) fn prepare_shifts(
     line: usize,
     how: How,
     shifts: &mut [[f32; SIDE]; 8],
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) {
     let Some((cone, first)) = tile.cone else { return };
     let turn = |v: DVec2| if how.by_columns { DVec2::new(v.y, v.x) } else { v };
@@ -423,9 +428,14 @@ pub(super) fn prepare_shifts(
     let (px, py, qx, qy) = (p.x as f32, p.y as f32, q.x as f32, q.y as f32);
     let det0 = m.det() as f32;
     let (radius2, alike2) = ((cone.radius * cone.radius) as f32, (cone.alike * cone.alike) as f32);
+    let y = (from.y + line as f64) as f32;
+    // Where the whole line is farther away than the cone is taken out.
+    let nearest = greatest(greatest(from.x as f32, -(from.x + (SIDE - 1) as f64) as f32), 0.0);
+    if nearest * nearest + y * y > radius2 {
+        return shifts.fill([0.0; SIDE]);
+    }
     let [dxx, dxy, ddet] = tensors(tile, line, how);
     let mut largest = [0f32; SIDE];
-    let y = (from.y + line as f64) as f32;
     for i in 0..SIDE {
         // Rounded once, so that rows and columns agree on which nodes the cone reaches.
         let x = (from.x + i as f64) as f32;
@@ -451,13 +461,10 @@ pub(super) fn prepare_shifts(
             & (qx * x + qy * y <= 0.0)
             & (r2 <= radius2)
             & ((r2 <= alike2) | Cone::applies(trace, ddet[i] * det0, dxx[i] + dyy, largest[i]));
-        largest[i] = choose(applies, largest[i], 0.0);
+        limits.shift[i] = greatest(limits.shift[i], choose(applies, largest[i], 0.0));
         for k in 0..8 {
             shifts[k][i] = choose(applies, shifts[k][i], 0.0);
         }
-    }
-    for i in 0..SIDE {
-        limits.shift = greatest(limits.shift, largest[i]);
     }
 }
 
@@ -483,7 +490,7 @@ fn sweep(
     how: How,
     dirty: Lines,
     changed: &mut [u32; SIDE],
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) -> Lines {
     sweep_lines::<false, false>(values, prepared, tile, how, dirty, changed, limits)
 }
@@ -501,7 +508,7 @@ fn sweep_in_cone(
     how: How,
     dirty: Lines,
     changed: &mut [u32; SIDE],
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) -> Lines {
     sweep_lines::<true, false>(values, prepared, tile, how, dirty, changed, limits)
 }
@@ -519,7 +526,7 @@ fn forget(
     how: How,
     dirty: Lines,
     changed: &mut [u32; SIDE],
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) -> Lines {
     sweep_lines::<false, true>(values, prepared, tile, how, dirty, changed, limits)
 }
@@ -537,7 +544,7 @@ fn forget_in_cone(
     how: How,
     dirty: Lines,
     changed: &mut [u32; SIDE],
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) -> Lines {
     sweep_lines::<true, true>(values, prepared, tile, how, dirty, changed, limits)
 }
@@ -550,7 +557,7 @@ fn sweep_lines<const IN_CONE: bool, const FORGET: bool>(
     how: How,
     dirty: Lines,
     changed: &mut [u32; SIDE],
-    limits: &mut Limits,
+    limits: &mut LaneLimits,
 ) -> Lines {
     let mut dirty = dirty;
     for step in 0..SIDE {

@@ -5,7 +5,7 @@
 use multiversion::multiversion;
 
 use super::super::field::{AREA, SIDE};
-use super::super::update::{How, Limits, RING, Tile, UNREACHED, choose, lanes, prepare_shifts};
+use super::super::update::{How, LaneLimits, RING, Tile, UNREACHED, choose, lanes, prepare_shifts};
 use super::FirstOrder;
 use super::functional::{ConeAt, Foot};
 use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
@@ -251,7 +251,7 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
     let (mut m0, mut origin) = ([1.0, 0.0, 1.0], [1.0, 0.0]);
     if let Some((cone, first)) = tile.cone {
         let how = How { by_columns: false, descending: false };
-        prepare_shifts(tile, row, how, &mut shifts, &mut Limits::default());
+        prepare_shifts(tile, row, how, &mut shifts, &mut LaneLimits::default());
         m0 = [cone.metric.xx as f32, cone.metric.xy as f32, cone.metric.yy as f32];
         origin = [(first.x - cone.at.x) as f32, (first.y + row as f64 - cone.at.y) as f32];
     }
