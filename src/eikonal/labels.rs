@@ -1,8 +1,6 @@
 //! Which start region each node belongs to.
 
-use glam::DVec2;
-use rayon::prelude::*;
-
+use super::origin::origins;
 use super::update::RING;
 use super::{DistanceMap, SLACK, source};
 
@@ -12,8 +10,6 @@ const UNKNOWN: u32 = u32::MAX;
 const PENDING: u32 = u32::MAX - 1;
 /// No region: not reached.
 const NONE: u32 = u32::MAX - 2;
-/// No place on the ring.
-const NOWHERE: u8 = u8::MAX;
 
 impl DistanceMap {
     /// The start region (its place in the list given to the solver) that each node, row-major from the north-west, is
@@ -25,7 +21,7 @@ impl DistanceMap {
     pub fn labels(&self) -> Vec<Option<u32>> {
         let cols = self.cols();
         let mut labels = self.seed_labels();
-        let origins = self.origins(&labels);
+        let origins = origins(&self.field, &self.cones, &self.values);
         let mut way = Vec::new();
         for first in 0..labels.len() {
             let mut at = first;
@@ -60,42 +56,6 @@ impl DistanceMap {
         // The map was seeded the same way without error.
         let _ = source::seed_all(&self.field, &self.starts, seeds);
         labels
-    }
-
-    /// Of each node without a label the place on its [`RING`] that leads home, see [`origin`](Self::origin); [`NOWHERE`] if none.
-    fn origins(&self, labels: &[u32]) -> Vec<u8> {
-        let cols = self.cols().max(1);
-        let mut origins = vec![NOWHERE; labels.len()];
-        origins.par_chunks_mut(cols).zip(labels.par_chunks(cols)).enumerate().for_each(
-            |(row, (origins, labels))| {
-                for (col, (origin, label)) in origins.iter_mut().zip(labels).enumerate() {
-                    if *label == UNKNOWN {
-                        *origin = self.origin(col, row).map_or(NOWHERE, |k| k as u8);
-                    }
-                }
-            },
-        );
-        origins
-    }
-
-    /// Of the two ends of the segment that a node's value came from, the one nearer to the point it came from; the other,
-    /// if only that is lower than the node. `None` where not reached.
-    fn origin(&self, col: usize, row: usize) -> Option<usize> {
-        if !self.is_reached(col, row) {
-            return None;
-        }
-        let (_, foot) = self.best_foot(col, row)?;
-        let near = foot.round();
-        // The foot lies between it and the end beyond.
-        let far = near + (foot - near).signum() * (foot - near).abs().ceil();
-        let ends = [near, far]
-            .map(|step| RING.iter().position(|&(i, j)| step == DVec2::new(i.into(), j.into())));
-        let here = self.stored(col, row);
-        let is_lower = |&k: &usize| {
-            self.beside(col, row, k as u8).is_some_and(|(c, r)| self.stored(c, r) < here)
-        };
-        // Beside a cone taken out both may be higher; the nearer one still leads there.
-        ends.into_iter().flatten().find(is_lower).or(ends[0])
     }
 
     /// The node at a place of the [`RING`].
