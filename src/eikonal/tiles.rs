@@ -16,7 +16,9 @@ use super::crew;
 use super::field::{AREA, SIDE, TensorField, Tiling, wrap};
 use super::source::Seeds;
 use super::stop::{self, Standing, Stop};
-use super::update::{ALL, Bench, Block, Limits, Lines, ROUNDING, Rule, Tile, UNREACHED};
+use super::update::{
+    ALL, Bench, Block, Limits, Lines, ROUNDING, Rule, Tile, UNREACHED, choose, lanes, least,
+};
 use crate::{Control, Result};
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
@@ -485,58 +487,70 @@ fn wakes(
     block: &Block,
 ) -> [f32; 8] {
     let (east, south) = (cols - 1, rows - 1);
-    // News at the borders, with one place before and after.
-    let news = |col: usize, row: usize| {
-        let (old, new) = (shared.board.at(tile, row * SIDE + col), block[row + 1][col + 1]);
-        if (old - new).abs() > ROUNDING * new { old.min(new) } else { f32::INFINITY }
-    };
-    let slack = |(dx, dy): (isize, isize)| {
+    let old = |col: usize, row: usize| shared.board.at(tile, row * SIDE + col);
+    let slack = |k: usize| {
+        let (dx, dy) = NEIGHBOURS[k];
         let Some(n) = neighbour(tiling, tile, dx, dy) else { return 0.0 };
         let slack = shared.limits.at(n).slack;
         // A periodic direction may be one tile wide.
         if n == tile { slack.max(limits.slack + limits.shift) } else { slack }
     };
-    let improves = |new: f32, old: f32, slack: f32| {
-        if old <= UNREACHED && new < old + slack { new } else { f32::INFINITY }
+    let across = |k: usize, row: usize, beside: usize| {
+        let line = |row: usize| lanes(&block[row], 1);
+        let old = std::array::from_fn(|col| old(col, row));
+        least_news(cols, old, line(row + 1), line(beside), slack(k))
     };
-    let side =
-        |k: usize, count: usize, line: [(usize, usize); SIDE], ring: [(usize, usize); SIDE]| {
-            let slack = slack(NEIGHBOURS[k]);
-            let mut padded = [f32::INFINITY; SIDE + 2];
-            for (news_at, &(col, row)) in padded[1..].iter_mut().zip(&line[..count]) {
-                *news_at = news(col, row);
-            }
-            let mut key = f32::INFINITY;
-            for i in 0..count {
-                let new = padded[i].min(padded[i + 1]).min(padded[i + 2]);
-                let (col, row) = ring[i];
-                key = key.min(improves(new, block[row][col], slack));
-            }
-            key
-        };
+    let down = |k: usize, col: usize, beside: usize| {
+        let line = |col: usize| std::array::from_fn(|row| block[row + 1][col]);
+        let old = std::array::from_fn(|row| old(col, row));
+        least_news(rows, old, line(col + 1), line(beside), slack(k))
+    };
     let corner = |k: usize, col: usize, row: usize| {
         let (dx, dy) = NEIGHBOURS[k];
-        let old = block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
-        improves(news(col, row), old, slack(NEIGHBOURS[k]))
+        let beside = block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
+        improves(news(old(col, row), block[row + 1][col + 1]), beside, slack(k))
     };
     [
-        side(
-            0,
-            rows,
-            std::array::from_fn(|i| (east, i)),
-            std::array::from_fn(|i| (east + 2, i + 1)),
-        ),
+        down(0, east, east + 2),
         corner(1, east, south),
-        side(
-            2,
-            cols,
-            std::array::from_fn(|i| (i, south)),
-            std::array::from_fn(|i| (i + 1, south + 2)),
-        ),
+        across(2, south, south + 2),
         corner(3, 0, south),
-        side(4, rows, std::array::from_fn(|i| (0, i)), std::array::from_fn(|i| (0, i + 1))),
+        down(4, 0, 0),
         corner(5, 0, 0),
-        side(6, cols, std::array::from_fn(|i| (i, 0)), std::array::from_fn(|i| (i + 1, 0))),
+        across(6, 0, 0),
         corner(7, east, 0),
     ]
+}
+
+/// The least of the news of the first `count` nodes of a line that could improve the line `beside` it.
+fn least_news(
+    count: usize,
+    old: [f32; SIDE],
+    new: [f32; SIDE],
+    beside: [f32; SIDE],
+    slack: f32,
+) -> f32 {
+    // With one place before and after.
+    let mut padded = [f32::INFINITY; SIDE + 2];
+    for i in 0..SIDE {
+        padded[i + 1] = choose(i < count, news(old[i], new[i]), f32::INFINITY);
+    }
+    let mut keys = [f32::INFINITY; SIDE];
+    for i in 0..SIDE {
+        let news = least(least(padded[i], padded[i + 1]), padded[i + 2]);
+        keys[i] = choose(i < count, improves(news, beside[i], slack), f32::INFINITY);
+    }
+    keys.into_iter().fold(f32::INFINITY, least)
+}
+
+/// The value that is news where it changed; infinite where it did not.
+#[inline(always)]
+fn news(old: f32, new: f32) -> f32 {
+    choose((old - new).abs() > ROUNDING * new, least(old, new), f32::INFINITY)
+}
+
+/// The news, if they could improve a value.
+#[inline(always)]
+fn improves(news: f32, value: f32, slack: f32) -> f32 {
+    choose((value <= UNREACHED) & (news < value + slack), news, f32::INFINITY)
 }

@@ -318,6 +318,7 @@ pub(super) fn prepare(
     limits: &mut LaneLimits,
 ) {
     let [xxs, xys, dets] = tensors(tile, line, how);
+    let (mut slack, mut longest) = ([0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
         let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
         let open = det > 0.0;
@@ -356,9 +357,13 @@ pub(super) fn prepare(
                 greatest(-k.fx[i] - falling, -k.fy[i] - falling),
             ),
         );
-        let longest = greatest(rising, falling);
-        limits.slack[i] = greatest(limits.slack[i], choose(open, obtuse, 0.0));
-        limits.longest_step[i] = greatest(limits.longest_step[i], choose(open, longest, 0.0));
+        slack[i] = choose(open, obtuse, 0.0);
+        longest[i] = choose(open, greatest(rising, falling), 0.0);
+    }
+    // In a loop of its own, or the limits are scattered lane by lane.
+    for i in 0..SIDE {
+        limits.slack[i] = greatest(limits.slack[i], slack[i]);
+        limits.longest_step[i] = greatest(limits.longest_step[i], longest[i]);
     }
     if let Some(seeds) = tile.seeds {
         for i in 0..SIDE {
