@@ -114,6 +114,37 @@ impl Tiling {
         from.max(least[axis]).ceil() as isize..to.min(most[axis]).floor() as isize + 1
     }
 
+    /// A metric at a point from those of the nodes, where these have one: bilinear over the corners of the cell.
+    pub(super) fn bilinear(
+        &self,
+        at: DVec2,
+        metric: impl Fn(isize, isize) -> Option<Sym2>,
+    ) -> Option<Sym2> {
+        let corner = |axis: usize, count: usize| {
+            let corner = at[axis].floor() as isize;
+            let last = count.saturating_sub(2) as isize;
+            if self.periodic[axis] { corner } else { corner.clamp(0, last) }
+        };
+        let (col, row) = (corner(0, self.cols), corner(1, self.rows));
+        let (u, v) = (at.x - col as f64, at.y - row as f64);
+        let mut sum = Sym2::default();
+        let mut weight = 0.0;
+        for (i, j, w) in [
+            (0, 0, (1.0 - u) * (1.0 - v)),
+            (1, 0, u * (1.0 - v)),
+            (0, 1, (1.0 - u) * v),
+            (1, 1, u * v),
+        ] {
+            if let Some(metric) = metric(col + i, row + j) {
+                // A trace of weight for every open corner, so that a point on a closed one has a metric too.
+                let w = w + 1e-9;
+                sum = sum + metric * w;
+                weight += w;
+            }
+        }
+        (weight > 0.0).then(|| sum * (1.0 / weight))
+    }
+
     /// What to add to a point to come to its images between `least` and `most`; in a direction that is not periodic there is
     /// only the point itself.
     pub(crate) fn turns(
@@ -234,11 +265,12 @@ impl TensorField {
 
     /// Closes the nodes that `is_open` says no to, given column and row.
     pub(crate) fn restrict(&mut self, is_open: impl Fn(usize, usize) -> bool) {
-        for row in 0..self.rows() {
-            for col in 0..self.cols() {
-                if !is_open(col, row) {
-                    let (tile, place) = self.tiling.place(col, row);
-                    self.tiles[tile].det[place] = 0.0;
+        for (index, tile) in self.tiles.iter_mut().enumerate() {
+            let [cols, rows] = self.tiling.size(index);
+            let (x, y) = (index % self.tiling.across * SIDE, index / self.tiling.across * SIDE);
+            for (row, line) in tile.det.chunks_exact_mut(SIDE).take(rows).enumerate() {
+                for (col, det) in line[..cols].iter_mut().enumerate() {
+                    *det = if is_open(x + col, y + row) { *det } else { 0.0 };
                 }
             }
         }
@@ -331,40 +363,15 @@ impl TensorField {
         (det > 0.0).then(|| Sym2::new((det + xy * xy) / xx, -xy, xx) * det.recip())
     }
 
-    /// Whether all corners of the cell around a point are open that its bilinear value depends on.
-    pub(super) fn is_open_around(&self, at: DVec2) -> bool {
-        let ends = |x: f64| [x.floor() as isize, x.ceil() as isize];
-        let open = |col, row| self.tiling.node(col, row).is_some_and(|(c, r)| self.is_open(c, r));
-        ends(at.y).iter().all(|&row| ends(at.x).iter().all(|&col| open(col, row)))
+    /// Stored metric of the node at a column and a row, as in [`Tiling::node`].
+    pub(super) fn metric_of(&self, col: isize, row: isize) -> Option<Sym2> {
+        let (col, row) = self.tiling.node(col, row)?;
+        self.metric(col, row)
     }
 
     /// Stored metric at grid coordinates: bilinear over the open corners of the cell; `None` if all are closed.
     pub(crate) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
-        let corner = |axis: usize, count: usize| {
-            let corner = at[axis].floor() as isize;
-            let last = count.saturating_sub(2) as isize;
-            if self.tiling.periodic[axis] { corner } else { corner.clamp(0, last) }
-        };
-        let (col, row) = (corner(0, self.cols()), corner(1, self.rows()));
-        let (u, v) = (at.x - col as f64, at.y - row as f64);
-        let mut sum = Sym2::default();
-        let mut weight = 0.0;
-        for (i, j, w) in [
-            (0, 0, (1.0 - u) * (1.0 - v)),
-            (1, 0, u * (1.0 - v)),
-            (0, 1, (1.0 - u) * v),
-            (1, 1, u * v),
-        ] {
-            if let Some((c, r)) = self.tiling.node(col + i, row + j)
-                && let Some(metric) = self.metric(c, r)
-            {
-                // A trace of weight for every open corner, so that a point on a closed one has a metric too.
-                let w = w + 1e-9;
-                sum = sum + metric * w;
-                weight += w;
-            }
-        }
-        (weight > 0.0).then(|| sum * (1.0 / weight))
+        self.tiling.bilinear(at, |col, row| self.metric_of(col, row))
     }
 }
 

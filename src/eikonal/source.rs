@@ -1,5 +1,7 @@
 //! Start regions: points between nodes, lines, areas.
 
+use std::array::from_fn;
+
 use glam::DVec2;
 
 use super::cone::Cone;
@@ -157,10 +159,11 @@ impl StartRegion {
         for (at, sides) in self.corners() {
             let Some(cone) = Cone::new(field, at, sides, travelled) else { continue };
             let is_clear = is_clear(field, at, POINT_RADIUS);
+            let patch = Patch::around(field, at);
             near(field, at, at, POINT_RADIUS, |col, row, node, _| {
                 if cone.holds(node - at)
                     && (is_clear || sees(field, node, at))
-                    && let Some(length) = geodesic(field, node, at)
+                    && let Some(length) = geodesic(&patch, node, at)
                 {
                     set(col, row, length);
                 }
@@ -317,33 +320,72 @@ fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
     Some(sum)
 }
 
+/// Side of a patch in nodes: it holds the cells half a cell beyond [`POINT_RADIUS`].
+const PATCH: usize = 2 * (POINT_RADIUS as usize + 2);
+
+/// The metrics of the nodes around a point: its seeds look at each some twenty times.
+struct Patch<'a> {
+    tiling: &'a Tiling,
+    /// Column and row of the first node.
+    first: [isize; 2],
+    metrics: [[Option<Sym2>; PATCH]; PATCH],
+}
+
+impl<'a> Patch<'a> {
+    fn around(field: &'a TensorField, at: DVec2) -> Self {
+        let reach = POINT_RADIUS as isize + 1;
+        let first = [at.x.floor() as isize - reach, at.y.floor() as isize - reach];
+        let metric = |col: usize, row: usize| {
+            field.metric_of(first[0] + col as isize, first[1] + row as isize)
+        };
+        let metrics = from_fn(|row| from_fn(|col| metric(col, row)));
+        Self { tiling: &field.tiling, first, metrics }
+    }
+
+    fn metric(&self, col: isize, row: isize) -> Option<Sym2> {
+        let (col, row) = (col - self.first[0], row - self.first[1]);
+        *self.metrics.get(row as usize)?.get(col as usize)?
+    }
+
+    /// As [`TensorField::metric_at`].
+    fn metric_at(&self, at: DVec2) -> Option<Sym2> {
+        self.tiling.bilinear(at, |col, row| self.metric(col, row))
+    }
+
+    /// Whether all corners of the cell around a point are open that its bilinear value depends on.
+    fn is_open_around(&self, at: DVec2) -> bool {
+        let ends = |x: f64| [x.floor() as isize, x.ceil() as isize];
+        ends(at.y).iter().all(|&row| ends(at.x).iter().all(|&col| self.metric(col, row).is_some()))
+    }
+}
+
 /// Length of the geodesic between two points nearby in stored units: `d² = E − B` up to fourth order in the distance,
 /// with the energy `E = ∫ vᵀMv` of the chord `v` and what bending saves, `B = ‖Γ(v, v)‖²_D/12` by the Christoffel
 /// symbols at its middle. Both points see each other.
-fn geodesic(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
+fn geodesic(patch: &Patch<'_>, a: DVec2, b: DVec2) -> Option<f64> {
     /// The expansion is no good where bending would save more than this share.
     const MOST: f64 = 0.2;
     let v = b - a;
     let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
     let mut energy = 0.0;
     for (i, weight) in weights.into_iter().enumerate() {
-        energy += weight / 12.0 * field.metric_at(a + v * (i as f64 / 4.0))?.form(v);
+        energy += weight / 12.0 * patch.metric_at(a + v * (i as f64 / 4.0))?.form(v);
     }
     let middle = a.midpoint(b);
-    let (least, most) = field.tiling.bounds();
+    let (least, most) = patch.tiling.bounds();
     let slope = |by: DVec2| {
         let (before, after) = ((middle - by).clamp(least, most), (middle + by).clamp(least, most));
         let length = (after - before).length();
         // Beside walls there is no telling; there the chord has to do.
-        if length > 0.0 && field.is_open_around(before) && field.is_open_around(after) {
-            Some((field.metric_at(after)? + field.metric_at(before)? * -1.0) * length.recip())
+        if length > 0.0 && patch.is_open_around(before) && patch.is_open_around(after) {
+            Some((patch.metric_at(after)? + patch.metric_at(before)? * -1.0) * length.recip())
         } else {
             Some(Sym2::default())
         }
     };
     let (mx, my) = (slope(DVec2::X)?, slope(DVec2::Y)?);
     let bend = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
-    let saved = field.metric_at(middle)?.inverse().form(bend) / 12.0;
+    let saved = patch.metric_at(middle)?.inverse().form(bend) / 12.0;
     Some((energy - saved.min(MOST * energy)).sqrt())
 }
 
