@@ -200,13 +200,14 @@ fn fill(labels: &mut [Option<u32>], inside: &[bool], cols: usize) {
     }
 }
 
-/// The columns and rows that hold all the places of a row-major grid with `cols` columns.
+/// The columns and rows that hold all the places, in ascending order, of a row-major grid with `cols` columns.
 fn spans(places: &[usize], cols: usize) -> [Range<usize>; 2] {
-    let span = |of: fn(usize, usize) -> usize| {
-        let all = places.iter().map(|&place| of(place, cols));
-        all.clone().min().unwrap_or(0)..all.max().map_or(0, |last| last + 1)
+    let [Some(&first), Some(&last)] = [places.first(), places.last()] else { return [0..0, 0..0] };
+    let widen = |span: Range<usize>, &place: &usize| {
+        let col = place % cols;
+        span.start.min(col)..span.end.max(col + 1)
     };
-    [span(|place, cols| place % cols), span(|place, cols| place / cols)]
+    [places.iter().fold(cols..0, widen), first / cols..last / cols + 1]
 }
 
 /// A part of a grid.
