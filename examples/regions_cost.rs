@@ -49,10 +49,10 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Regions, and milliseconds of each stage.
-fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; 5])> {
+/// Regions, and milliseconds of each stage, and of what belongs to none.
+fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; STAGES.len() + 1])> {
     let control = Control::default();
-    let mut times = [0.0; 5];
+    let mut times = [0.0; STAGES.len() + 1];
     let mut clock = Instant::now();
     let mut lap = |stage: usize| {
         times[stage] += 1e3 * clock.elapsed().as_secs_f64();
@@ -63,11 +63,12 @@ fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; 5])>
     lap(0);
     let start = DVec2::splat(0.5 * (field.cols() - 1) as f64);
     let copy = field.clone();
+    lap(STAGES.len());
     let map = Solver::default().solve_field(copy, &[start.into()], &Stop::Never, &control)?;
     lap(1);
     let farthest = map.to_row_major().into_iter().fold(0f32, f32::max);
     drop(map);
-    lap(1);
+    lap(STAGES.len());
     let ranks = metric.seed_ranks();
     lap(2);
     // The default on small grids, some hundred regions on large ones.

@@ -21,7 +21,7 @@ impl DistanceMap {
     pub fn labels(&self) -> Vec<Option<u32>> {
         let cols = self.cols();
         let mut labels = self.seed_labels();
-        let origins = origins(&self.field, &self.cones, &self.values);
+        let origins = origins(&self.field, &self.cones, self.corrected());
         let mut way = Vec::new();
         for first in 0..labels.len() {
             let mut at = first;

@@ -335,6 +335,18 @@ impl DistanceMap {
         self.values.tiles[tile][place] + correction
     }
 
+    /// Values at all nodes in the field's stored units, corrected.
+    fn corrected(&self) -> Values {
+        let mut values = self.values.clone();
+        let Some(correction) = &self.correction else { return values };
+        for (tile, nodes) in values.tiles.iter_mut().enumerate() {
+            for (place, value) in nodes.iter_mut().enumerate() {
+                *value += correction.at(tile, place);
+            }
+        }
+        values
+    }
+
     pub(crate) fn stored(&self, col: usize, row: usize) -> f64 {
         f64::from(self.value(col, row))
     }

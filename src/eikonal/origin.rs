@@ -20,9 +20,9 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 /// Of each node, row-major, the place on its [`RING`](super::update::RING) that leads home: of the two ends of the segment that
 /// its value came from, the one nearer to the point it came from; the other, if only that is lower than the node. [`NOWHERE`]
 /// where not reached. Beside a cone taken out both may be higher; the nearer one still leads there.
-pub(super) fn origins(field: &TensorField, cones: &Cones, values: &Values) -> Vec<u8> {
+pub(super) fn origins(field: &TensorField, cones: &Cones, values: Values) -> Vec<u8> {
     let tiling = field.tiling;
-    let board = Board::new(values.clone());
+    let board = Board::new(values);
     let mut origins = vec![NOWHERE; tiling.cols * tiling.rows];
     let bands = origins.par_chunks_mut((tiling.cols * SIDE).max(1)).enumerate();
     bands.for_each_init(Block::default, |block, (y, band)| {
@@ -127,4 +127,48 @@ fn of_line<const IN_CONE: bool>(block: &Block, tile: &Tile<'_>, row: usize) -> [
         origins[i] = if own[i] < UNREACHED { origin } else { u32::from(NOWHERE) };
     }
     origins
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::super::update::RING;
+    use super::*;
+    use crate::{Control, Solver, Stop, Sym2};
+
+    #[test]
+    fn origins_are_the_ends_nearest_to_the_feet() {
+        let tensor = |col: usize, row: usize| {
+            let (sin, cos) = (0.1 * col as f64 + 0.07 * row as f64).sin_cos();
+            let along = Sym2::new(cos * cos, sin * cos, sin * sin);
+            ((col * 7 + row * 13) % 29 != 0).then(|| along * 0.9 + Sym2::new(0.1, 0.0, 0.1))
+        };
+        for periodic in [[false, false], [true, false]] {
+            let control = Control::default();
+            let field = TensorField::from_fn(50, 40, tensor, &control).unwrap();
+            let field = field.periodic(periodic).unwrap();
+            let start = DVec2::new(20.3, 17.6).into();
+            let map = Solver::default().solve_field(field, &[start], &Stop::Never, &control);
+            let map = map.unwrap();
+            let (mut reached, mut nearest) = (0, 0);
+            for (node, origin) in
+                origins(&map.field, &map.cones, map.values.clone()).into_iter().enumerate()
+            {
+                let (col, row) = (node % map.cols(), node / map.cols());
+                if !map.is_reached(col, row) {
+                    assert_eq!(origin, NOWHERE);
+                    continue;
+                }
+                let (_, foot) = map.best_foot(col, row).unwrap();
+                let (i, j) = RING[usize::from(origin)];
+                let away = (DVec2::new(i.into(), j.into()) - foot).abs().max_element();
+                assert!(away <= 1.0, "({col}, {row}): {origin}, {foot}");
+                reached += 1;
+                nearest += usize::from(away <= 0.501);
+            }
+            // Of the rest only the other end is lower than the node.
+            assert!(reached > 1800 && nearest * 20 > reached * 19, "{nearest} of {reached}");
+        }
+    }
 }

@@ -159,11 +159,11 @@ impl StartRegion {
         for (at, sides) in self.corners() {
             let Some(cone) = Cone::new(field, at, sides, travelled) else { continue };
             let is_clear = is_clear(field, at, POINT_RADIUS);
-            let patch = Patch::around(field, at);
+            let vicinity = Vicinity::around(field, at);
             near(field, at, at, POINT_RADIUS, |col, row, node, _| {
                 if cone.holds(node - at)
                     && (is_clear || sees(field, node, at))
-                    && let Some(length) = geodesic(&patch, node, at)
+                    && let Some(length) = geodesic(&vicinity, node, at)
                 {
                     set(col, row, length);
                 }
@@ -320,18 +320,18 @@ fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
     Some(sum)
 }
 
-/// Side of a patch in nodes: it holds the cells half a cell beyond [`POINT_RADIUS`].
-const PATCH: usize = 2 * (POINT_RADIUS as usize + 2);
+/// Side of a vicinity in nodes: it holds the cells half a cell beyond [`POINT_RADIUS`].
+const VICINITY: usize = 2 * (POINT_RADIUS as usize + 2);
 
 /// The metrics of the nodes around a point: its seeds look at each some twenty times.
-struct Patch<'a> {
+struct Vicinity<'a> {
     tiling: &'a Tiling,
     /// Column and row of the first node.
     first: [isize; 2],
-    metrics: [[Option<Sym2>; PATCH]; PATCH],
+    metrics: [[Option<Sym2>; VICINITY]; VICINITY],
 }
 
-impl<'a> Patch<'a> {
+impl<'a> Vicinity<'a> {
     fn around(field: &'a TensorField, at: DVec2) -> Self {
         let reach = POINT_RADIUS as isize + 1;
         let first = [at.x.floor() as isize - reach, at.y.floor() as isize - reach];
@@ -362,30 +362,30 @@ impl<'a> Patch<'a> {
 /// Length of the geodesic between two points nearby in stored units: `d² = E − B` up to fourth order in the distance,
 /// with the energy `E = ∫ vᵀMv` of the chord `v` and what bending saves, `B = ‖Γ(v, v)‖²_D/12` by the Christoffel
 /// symbols at its middle. Both points see each other.
-fn geodesic(patch: &Patch<'_>, a: DVec2, b: DVec2) -> Option<f64> {
+fn geodesic(vicinity: &Vicinity<'_>, a: DVec2, b: DVec2) -> Option<f64> {
     /// The expansion is no good where bending would save more than this share.
     const MOST: f64 = 0.2;
     let v = b - a;
     let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
     let mut energy = 0.0;
     for (i, weight) in weights.into_iter().enumerate() {
-        energy += weight / 12.0 * patch.metric_at(a + v * (i as f64 / 4.0))?.form(v);
+        energy += weight / 12.0 * vicinity.metric_at(a + v * (i as f64 / 4.0))?.form(v);
     }
     let middle = a.midpoint(b);
-    let (least, most) = patch.tiling.bounds();
+    let (least, most) = vicinity.tiling.bounds();
     let slope = |by: DVec2| {
         let (before, after) = ((middle - by).clamp(least, most), (middle + by).clamp(least, most));
         let length = (after - before).length();
         // Beside walls there is no telling; there the chord has to do.
-        if length > 0.0 && patch.is_open_around(before) && patch.is_open_around(after) {
-            Some((patch.metric_at(after)? + patch.metric_at(before)? * -1.0) * length.recip())
+        if length > 0.0 && vicinity.is_open_around(before) && vicinity.is_open_around(after) {
+            Some((vicinity.metric_at(after)? + vicinity.metric_at(before)? * -1.0) * length.recip())
         } else {
             Some(Sym2::default())
         }
     };
     let (mx, my) = (slope(DVec2::X)?, slope(DVec2::Y)?);
     let bend = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
-    let saved = patch.metric_at(middle)?.inverse().form(bend) / 12.0;
+    let saved = vicinity.metric_at(middle)?.inverse().form(bend) / 12.0;
     Some((energy - saved.min(MOST * energy)).sqrt())
 }
 

@@ -158,7 +158,9 @@ pub(super) fn cover(
     order.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut seeds = Vec::new();
     let quiet = control.quiet();
-    let mut clusters = Clusters { field, reach: REACH, looked_at: 0 };
+    // For the largest distance all is looked at.
+    let reach = if epsilon.is_some() { REACH } else { cols.max(field.rows()) };
+    let mut clusters = Clusters { field, reach, looked_at: 0 };
     let mut around =
         |place: usize, epsilon: f64| clusters.around([place % cols, place / cols], epsilon, &quiet);
     let epsilon = match (epsilon, order.first()) {
