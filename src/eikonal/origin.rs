@@ -142,7 +142,8 @@ mod tests {
         let tensor = |col: usize, row: usize| {
             let (sin, cos) = (0.1 * col as f64 + 0.07 * row as f64).sin_cos();
             let along = Sym2::new(cos * cos, sin * cos, sin * sin);
-            ((col * 7 + row * 13) % 29 != 0).then(|| along * 0.9 + Sym2::new(0.1, 0.0, 0.1))
+            (!(col * 7 + row * 13).is_multiple_of(29))
+                .then(|| along * 0.9 + Sym2::new(0.1, 0.0, 0.1))
         };
         for periodic in [[false, false], [true, false]] {
             let control = Control::default();

@@ -333,17 +333,16 @@ struct Vicinity<'a> {
 
 impl<'a> Vicinity<'a> {
     fn around(field: &'a TensorField, at: DVec2) -> Self {
-        let reach = POINT_RADIUS as isize + 1;
-        let first = [at.x.floor() as isize - reach, at.y.floor() as isize - reach];
-        let metric = |col: usize, row: usize| {
-            field.metric_of(first[0] + col as isize, first[1] + row as isize)
-        };
+        // Also far outside the grid.
+        let first = [at.x, at.y].map(|x| (x.floor() - POINT_RADIUS - 1.0) as isize);
+        let place = |axis: usize, i: usize| first[axis].saturating_add_unsigned(i);
+        let metric = |col: usize, row: usize| field.metric_of(place(0, col), place(1, row));
         let metrics = from_fn(|row| from_fn(|col| metric(col, row)));
         Self { tiling: &field.tiling, first, metrics }
     }
 
     fn metric(&self, col: isize, row: isize) -> Option<Sym2> {
-        let (col, row) = (col - self.first[0], row - self.first[1]);
+        let (col, row) = (col.wrapping_sub(self.first[0]), row.wrapping_sub(self.first[1]));
         *self.metrics.get(row as usize)?.get(col as usize)?
     }
 

@@ -128,7 +128,7 @@ const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 pub(super) const WINDOW_CELLS: f32 = 16.0;
 /// The same on a grid of at most [`FEW_TILES`], where a round has hardly more tiles whatever its width.
 const NARROW_CELLS: f32 = 4.0;
-const FEW_TILES: usize = 256;
+const FEW_TILES: usize = 64;
 
 /// The tiles that wait, and what is known of each.
 #[derive(Debug)]
