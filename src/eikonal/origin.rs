@@ -22,7 +22,7 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 /// where not reached. Beside a cone taken out both may be higher; the nearer one still leads there.
 pub(super) fn origins(field: &TensorField, cones: &Cones, values: Values) -> Vec<u8> {
     let tiling = field.tiling;
-    let board = Board::new(values);
+    let board = Board::new(values, f32::INFINITY);
     let mut origins = vec![NOWHERE; tiling.cols * tiling.rows];
     let bands = origins.par_chunks_mut((tiling.cols * SIDE).max(1)).enumerate();
     bands.for_each_init(Block::default, |block, (y, band)| {
