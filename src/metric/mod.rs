@@ -34,6 +34,10 @@ pub use self::sym2::Sym2;
 use crate::surface::BLOCK;
 use crate::{Control, Error, HeightJet, HeightSurface, ParametricSurface, Result};
 
+/// What bends by no more than this, as curvature times extent, is a plane. A plane of 4000² cells of 30 m with heights in `f32` is fitted,
+/// by the defaults, with 5e-4 of rounding.
+pub(crate) const PLANE_BEND: f64 = 1e-3;
+
 /// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Delta {
@@ -62,10 +66,8 @@ impl Delta {
             Self::Absolute(delta) => check(delta, "delta"),
             Self::Auto(share) => {
                 let share = check(share, "the share of the curvature that delta is to be")?;
-                // A plane of 4000² cells of 30 m with heights in f32 is fitted, by the defaults, with 5e-4 / extent of rounding.
-                let flat = 1e-3 / extent;
                 let rms = rms_curvature();
-                Ok(if rms > flat { share * rms } else { extent.recip() })
+                Ok(if rms * extent > PLANE_BEND { share * rms } else { extent.recip() })
             }
         }
     }

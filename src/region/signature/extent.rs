@@ -5,6 +5,7 @@
 use multiversion::multiversion;
 
 use super::cut::{Run, Sum};
+use crate::metric::PLANE_BEND;
 use crate::surface::{BLOCK, Forms};
 
 /// `δ` as a share of the root-mean-square curvature of the region. That of the metric, 0.1, makes peaks of `C` along the lines
@@ -26,16 +27,18 @@ pub(super) struct Size {
     pub(super) side: f64,
     /// Offset of its curvature tensor, 1/m.
     pub(super) delta: f64,
+    /// Whether it bends no more than rounded heights of a plane do: then nothing varies in it.
+    pub(super) is_flat: bool,
 }
 
 impl Extent {
     pub(super) fn size(&self) -> Size {
         let side = self.area.sqrt();
         let rms = (self.squared_curvature / self.area).sqrt();
-        // As for a whole surface: curvature below this is rounding.
-        let flat = 1e-8 / side;
-        let delta = if rms > flat { DELTA_SHARE * rms } else { side.recip() };
-        Size { side, delta }
+        // As for a whole surface, see `Delta`.
+        let is_flat = rms.is_nan() || rms * side <= PLANE_BEND;
+        let delta = if is_flat { side.recip() } else { DELTA_SHARE * rms };
+        Size { side, delta, is_flat }
     }
 }
 

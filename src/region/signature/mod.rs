@@ -26,7 +26,7 @@ use crate::{Control, Error, ParametricSurface, Result};
 /// Eigenvalues of the covariance of the neighbour differences over a region, largest first, 0 or more.
 ///
 /// They have no unit and are the same for a region and its copy that is moved, turned, mirrored, scaled or has other parameters.
-/// All 0 where the curvature is the same everywhere, and for regions of one node.
+/// All 0 where the curvature is the same everywhere, in what is flat, bending by less than 1e-3 over its size, and for regions of one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Signature {
     /// `λ1 ≥ λ2 ≥ λ3 ≥ λ4`.
@@ -101,7 +101,7 @@ pub fn signatures(
         Neighbours::Grid => along_grid(&tensors, &sizes, run, moments),
     })?;
     let signature = |(sum, size): (&Moments, &Size)| Signature {
-        eigenvalues: eigenvalues(sum.covariance()),
+        eigenvalues: if size.is_flat { [0.0; 4] } else { eigenvalues(sum.covariance()) },
         size: size.side,
     };
     Ok(sums.iter().zip(&sizes).map(signature).collect())
@@ -347,6 +347,8 @@ mod tests {
         assert!(sphere[0].eigenvalues[0] < 1e-3, "{sphere:?}");
         let plane = Bumps { lift: 0.0, ..Bumps::of(21) };
         assert_eq!(plane.signature(Neighbours::Surface).eigenvalues, [0.0; 4]);
+        let rounded = Bumps { lift: 1e-5, ..plane };
+        assert_eq!(rounded.signature(Neighbours::Surface).eigenvalues, [0.0; 4]);
         let node = of_all(&Torus(3.0), |i| (i == 700).then_some(0));
         assert_eq!(node[0].eigenvalues, [0.0; 4]);
         assert_eq!(node[0].distance(&sphere[0]).max(0.9), 0.9);
