@@ -85,7 +85,7 @@ impl Segmentation {
     /// [`MetricField::seed_ranks`](crate::MetricField::seed_ranks) gives them.
     ///
     /// # Cost
-    /// Some 1 µs of one core per node and level, with its ranks; 0.16 ms and 3 kB per region. `docs/regions.md` has measurements.
+    /// Some 0.5 µs of one core per node and level, with its ranks; 0.1 ms and 3 kB per region. `docs/regions.md` has measurements.
     ///
     /// # Errors
     /// [`Error::Usage`] for options out of range, ranks that are not one per node, no open node, or an `ε` so small that the clusters
