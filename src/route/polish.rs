@@ -43,8 +43,8 @@ const NOISE: f64 = 1e-6;
 const MOST_STEPS: usize = 40;
 /// Shifts between the first one above 0 and the end of all hope.
 const SHIFTS: std::ops::Range<f64> = 1e-3..1e6;
-/// A line that ends with a larger shift hardly moved, for the metric jumps beside it. The curvature tensor on rough ground needs
-/// 200, costs that jump by 1 : 10 need 2000, by 1 : 50 27 000.
+/// A line that ends with a larger shift hardly moved, for the metric jumps beside it. The curvature tensor on rough ground ends
+/// with up to 200, costs that jump by 1 : 10 with 70 to 3000, by 1 : 50 with 27 000.
 const JUMP: f64 = 1e3;
 /// Steps of the search in cells. The finer ones are of no use before the coarser.
 const STRIDES: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
