@@ -188,24 +188,31 @@ pub struct TensorField {
 }
 
 impl TensorField {
-    /// Samples a metric at the nodes of its surface.
+    /// Samples a metric at the nodes of its surface. Nodes within metres of a pole, where cells have no width, are closed.
     ///
     /// # Errors
-    /// Cancelled.
+    /// [`Error::Usage`] if a tensor is too far from what is typical, as in [`set`](Self::set); cancelled.
     pub fn sample(metric: &MetricField<'_>, control: &Control) -> Result<Self> {
         let frame = metric.surface().frame();
         // Columns run east, rows run south, one node per step.
         let stretch: Vec<_> = (0..frame.rows())
             .map(|row| frame.spacing(row as f64).recip() * DVec2::new(1.0, -1.0))
             .collect();
-        let sample = |col, row, speeds: &mut SpeedBlock| metric.block_speeds(col, row, speeds);
+        let widest = NO_WIDTH / frame.mid_spacing().x;
+        let sample = |col, row: usize, speeds: &mut SpeedBlock| {
+            metric.block_speeds(col, row, speeds);
+            for (det, by) in speeds.det.iter_mut().zip(&stretch[row..]) {
+                *det = if by.x < widest { *det } else { Default::default() };
+            }
+        };
         Self::build(frame.cols(), frame.rows(), &stretch, sample, control)
     }
 
-    /// The field of a function of `(column, row)` in index coordinates; `None` for a closed node.
+    /// The field of a function of `(column, row)` in index coordinates; `None`, or a tensor that is not positive definite, for a
+    /// closed node.
     ///
     /// # Errors
-    /// Cancelled.
+    /// [`Error::Usage`] if a tensor is too far from what is typical, as in [`set`](Self::set); cancelled.
     pub fn from_fn(
         cols: usize,
         rows: usize,
@@ -303,6 +310,17 @@ impl TensorField {
             })
             .unzip_into_vecs(&mut tiles, &mut cells);
         control.check()?;
+        if let Some(tile) = cells.iter().position(|cells| cells.lost > 0) {
+            let (col, row) = ((tile % tiling.across) * SIDE, (tile / tiling.across) * SIDE);
+            let mut speeds = SpeedBlock::default();
+            sample(col, row, &mut speeds);
+            let (i, j) = (0..AREA)
+                .map(|place| (place % SIDE, place / SIDE))
+                .find(|&(i, j)| speeds.is_open(j, i) && tiles[tile].det[j * SIDE + i] == 0.0)
+                .unwrap_or_default();
+            let count = cells.iter().map(|cells| u64::from(cells.lost)).sum();
+            return Err(too_far(col + i, row + j, count));
+        }
         let (sum, count) = cells.iter().fold((0.0, 0), |(sum, count), cells| {
             (sum + f64::from(cells.lengths), count + cells.count as usize)
         });
@@ -322,17 +340,21 @@ impl TensorField {
         self.tiling.rows
     }
 
-    /// Gives a node another tensor in index coordinates, or closes it (`None`). A tensor whose entries
-    /// are more than 10¹⁵ times larger or smaller than is typical of the field closes it too.
+    /// Gives a node another tensor in index coordinates, or closes it (`None`, or a tensor that is not positive definite).
     ///
     /// # Errors
-    /// [`Error::Usage`] if the node is not on the grid.
+    /// [`Error::Usage`] if the node is not on the grid, or a diagonal entry or the determinant of the tensor more than 10¹⁵ times
+    /// larger or smaller than was typical of the field when it was made.
     pub fn set(&mut self, col: usize, row: usize, tensor: Option<Sym2>) -> Result<()> {
         if col >= self.cols() || row >= self.rows() {
             return Err(Error::usage(format!("the node ({col}, {row}) is not on the grid")));
         }
-        let d = tensor.unwrap_or_default() * self.root_scale.powi(-2);
+        let open = tensor.filter(|d| d.is_positive_definite());
+        let d = open.unwrap_or_default() * self.root_scale.powi(-2);
         let fits = fits(d.xx) & fits(d.yy) & fits(d.det());
+        if open.is_some() && !fits {
+            return Err(too_far(col, row, 1));
+        }
         let stored = |value: f64| if fits { value as f32 } else { 0.0 };
         let (tile, place) = self.tiling.place(col, row);
         let tile = &mut self.tiles[tile];
@@ -381,7 +403,26 @@ struct Cells {
     /// Sum of their lengths `det(D)^(−1/4)`, in stored units.
     lengths: f32,
     count: u32,
+    /// How many more would be open, but are too far from what is typical.
+    lost: u32,
 }
+
+/// The refusal of `count` tensors, the first of them at this node.
+fn too_far(col: usize, row: usize, count: u64) -> Error {
+    let others = match count {
+        1 => String::new(),
+        2 => " and at another node".into(),
+        _ => format!(" and at {} other nodes", count - 1),
+    };
+    Error::usage(format!(
+        "the speed tensor at column {col}, row {row}{others} has entries or a determinant more than 1e15 times larger or \
+         smaller than is typical, which cannot be computed with; make such nodes barriers (NaN or nodata), or let the \
+         speeds differ less"
+    ))
+}
+
+/// A row whose cells are so many times narrower than those in the middle lies at a pole.
+const NO_WIDTH: f64 = 1e5;
 
 /// A power of two near the typical speed `det(D)^(1/4)`, from tiles spread over the grid.
 fn typical_speed(
@@ -410,7 +451,7 @@ fn typical_speed(
 }
 
 /// Stores the tensors of a block in coordinates stretched by `stretch` of each row and `shrink`. A tensor out of the range
-/// of `f32` closes its node.
+/// of `f32` is lost.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -418,7 +459,7 @@ fn typical_speed(
 ))]
 fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorTile) -> Cells {
     let mut lengths = [0f32; SIDE];
-    let mut counts = [0u32; SIDE];
+    let (mut counts, mut lost) = ([0u32; SIDE], [0u32; SIDE]);
     for (row, by) in stretch.iter().take(SIDE).enumerate() {
         let (x, y) = (by.x * shrink, by.y * shrink);
         let (fxx, fxy, fyy, fdet) = (x * x, x * y, y * y, (x * y) * (x * y));
@@ -433,9 +474,10 @@ fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorT
             let length = (1.0 / det as f32).sqrt().sqrt();
             lengths[i] += if fits { length } else { 0.0 };
             counts[i] += u32::from(fits);
+            lost[i] += u32::from(speeds.is_open(row, i) & !fits);
         }
     }
-    Cells { lengths: lengths.iter().sum(), count: counts.iter().sum() }
+    Cells { lengths: lengths.iter().sum(), count: counts.iter().sum(), lost: lost.iter().sum() }
 }
 
 /// Whether a number, and the numbers it is multiplied with, keep within the range of `f32`.
@@ -472,6 +514,43 @@ mod tests {
             }
         }
         largest
+    }
+
+    #[test]
+    fn tensors_too_far_from_the_typical_are_refused() {
+        let odd = |d: Option<Sym2>| {
+            let tensor =
+                |col, row| if (col, row) == (20, 17) { d } else { Some(Sym2::new(1.0, 0.0, 1.0)) };
+            TensorField::from_fn(40, 30, tensor, &Control::default())
+        };
+        for wild in
+            [Sym2::new(1e9, 0.0, 1e9), Sym2::new(1e-9, 0.0, 1e-9), Sym2::new(1e16, 0.0, 1e-16)]
+        {
+            let error = odd(Some(wild)).unwrap_err().to_string();
+            assert!(error.contains("column 20, row 17 has"), "{error}");
+            assert!(odd(None).unwrap().set(20, 17, Some(wild)).is_err());
+        }
+        let [nan, infinite] = [f64::NAN, f64::INFINITY].map(|x| Sym2::new(x, 0.0, 1.0));
+        for closed in [None, Some(nan), Some(infinite), Some(Sym2::new(-1.0, 0.0, -1.0))] {
+            let mut field = odd(closed).unwrap();
+            assert!(!field.is_open(20, 17) && field.is_open(19, 17));
+            field.set(19, 17, closed).unwrap();
+            assert!(!field.is_open(19, 17));
+        }
+    }
+
+    #[test]
+    fn rows_at_a_pole_are_closed() {
+        let frame =
+            GridFrame::new(36, 19, DVec2::new(0.0, 90.0), DVec2::splat(10.0), Ground::WGS84)
+                .unwrap();
+        let terrain = Terrain::new(frame, vec![0.0; 36 * 19], Crs::none()).unwrap();
+        let control = Control::default();
+        let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
+        let metric = Metric::Isotropic.on(&surface, &Modifiers::default(), &control).unwrap();
+        let field = TensorField::sample(&metric, &control).unwrap();
+        let open = [0, 1, 17, 18].map(|row| field.is_open(5, row));
+        assert_eq!(open, [false, true, true, false]);
     }
 
     #[test]

@@ -27,6 +27,13 @@ impl SpeedBlock {
         self.det[row][i] = det;
     }
 
+    /// Whether the tensor in column `i` of row `row` is positive definite.
+    #[inline(always)]
+    pub(crate) fn is_open(&self, row: usize, i: usize) -> bool {
+        let det = self.det[row][i];
+        (self.xx[row][i] > 0.0) & (det > 0.0) & (det < f64::INFINITY)
+    }
+
     /// Multiplies the tensor in column `i` of row `row` by `factor`.
     pub(super) fn scale(&mut self, row: usize, i: usize, factor: f64) {
         let (d, det) = self.get(row, i);

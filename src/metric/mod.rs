@@ -247,8 +247,7 @@ fn check_costs(surface: &HeightSurface, costs: &[f32]) -> Result<()> {
     Ok(())
 }
 
-/// The solver keeps `det D`, which goes with the fourth power of the cost, within 1e±15 of what is typical, and closes nodes
-/// beyond.
+/// The solver keeps `det D`, which goes with the fourth power of the cost, within 1e±15 of what is typical.
 const MOST_COST_RATIO: f32 = 1000.0;
 
 fn check_tensors(surface: &dyn ParametricSurface, tensors: &[Sym2]) -> Result<()> {
