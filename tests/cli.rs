@@ -285,6 +285,13 @@ fn a_tensor_raster_measures_as_its_tensor_says() {
     let expected = 900.0 / slope.sqrt();
     let found = distance("--tensor tensor.tif");
     assert!((found - expected).abs() < 1e-3 * expected, "{found} {expected}");
+    for command in [
+        "distance plane.tif --start pixel:5,5 --metric curvature",
+        "compare plane.tif --start pixel:5,5 --goal pixel:9,9 --metrics isotropic,curvature",
+    ] {
+        let unused = "--tensor is used by the metric `tensor` alone, which is not asked for; name it, or leave --tensor out";
+        folder.bad(&format!("{command} --tensor tensor.tif"), 2, unused);
+    }
     // As a cost the slope multiplies every length; along its row the plane rises 1 : 12.
     folder.good("surface plane.tif --layers slope -o cost.tif");
     let ratio = distance("--cost cost.tif --metric isotropic") / distance("--metric isotropic");

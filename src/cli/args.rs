@@ -488,6 +488,32 @@ impl MetricArgs {
         Solver { accuracy, ..Solver::default() }
     }
 
+    /// The metric to use where the user asks for `asked`.
+    ///
+    /// # Errors
+    /// As [`check_tensor`](Self::check_tensor).
+    pub(crate) fn chosen(&self, asked: Option<MetricName>) -> Result<MetricName, Error> {
+        let name = asked.unwrap_or(self.default_name());
+        self.check_tensor(&[name])?;
+        Ok(name)
+    }
+
+    /// The metric that a user who names none wants.
+    pub(crate) fn default_name(&self) -> MetricName {
+        if self.tensor.is_some() { MetricName::Tensor } else { MetricName::Curvature }
+    }
+
+    /// # Errors
+    /// `--tensor` beside metrics that do not look at it.
+    pub(crate) fn check_tensor(&self, names: &[MetricName]) -> Result<(), Error> {
+        if self.tensor.is_some() && !names.contains(&MetricName::Tensor) {
+            return Err(Error::usage(
+                "--tensor is used by the metric `tensor` alone, which is not asked for; name it, or leave --tensor out",
+            ));
+        }
+        Ok(())
+    }
+
     /// The metric of this name, with the user's tensors if there are any.
     ///
     /// # Errors

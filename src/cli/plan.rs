@@ -88,11 +88,6 @@ impl<'a> Journey<'a> {
         self
     }
 
-    /// The metric that a user who names none wants.
-    pub(crate) fn default_metric(&self) -> MetricName {
-        if self.tensors.is_some() { MetricName::Tensor } else { MetricName::Curvature }
-    }
-
     /// The metric of this name.
     ///
     /// # Errors

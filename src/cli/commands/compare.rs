@@ -20,6 +20,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     if let Some(folder) = &args.output {
         check_outputs_in(folder, &FILES, args.overwrite)?;
     }
+    let names = metrics(args)?;
     let places = (&args.start.start[..], std::slice::from_ref(&args.goal));
     let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let [goal] = &journey.goals[..] else {
@@ -29,10 +30,8 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
             journey.goals.len()
         )));
     };
-    let fields = metrics(args, &journey)
-        .into_iter()
-        .map(|name| journey.field(name, control))
-        .collect::<Result<Vec<_>>>()?;
+    let fields =
+        names.into_iter().map(|name| journey.field(name, control)).collect::<Result<Vec<_>>>()?;
     let comparison = Comparison::between(
         args.ground.metric.solver(),
         &fields,
@@ -56,23 +55,24 @@ const EXPLANATION: &str =
     "x METRIC: cost under that metric, as a ratio to the best route under it\n";
 
 /// The metrics asked for, each once.
-fn metrics(args: &CompareArgs, journey: &Journey<'_>) -> Vec<MetricName> {
+fn metrics(args: &CompareArgs) -> Result<Vec<MetricName>> {
     let mut names = args.metrics.clone();
     if names.is_empty() {
         names = vec![
             MetricName::Isotropic,
             MetricName::Curvature,
             MetricName::Difference,
-            journey.default_metric(),
+            args.ground.metric.default_name(),
         ];
     }
+    args.ground.metric.check_tensor(&names)?;
     let mut once = Vec::new();
     for name in names {
         if !once.contains(&name) {
             once.push(name);
         }
     }
-    once
+    Ok(once)
 }
 
 fn table(fields: &[MetricField<'_>], comparison: &Comparison) -> Table {

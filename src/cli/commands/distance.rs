@@ -29,10 +29,11 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     if let Some(path) = &args.isolines {
         check_file(path, &["geojson", "json"], args.overwrite, Some(&args.dem))?;
     }
+    let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
-    let field = journey.field(args.metric.unwrap_or(journey.default_metric()), control)?;
+    let field = journey.field(name, control)?;
     let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
     let map = journey.solve(&field, &stop)?;
     let provenance = journey.provenance(std::slice::from_ref(&field));

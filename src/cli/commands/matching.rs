@@ -98,8 +98,8 @@ impl<'a> Subject<'a> {
             let (ranks, field) = (metric.seed_ranks(), metric.sample(control)?);
             (Ground::Nurbs(Box::new(surface)), ranks, field)
         } else {
+            let name = args.ground.metric.chosen(args.metric)?;
             let journey = Journey::prepare(path, (&[], &[]), &args.ground, run, control)?;
-            let name = args.metric.unwrap_or(journey.default_metric());
             let metric = journey.field(name, control)?;
             let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
             drop(metric);

@@ -58,9 +58,10 @@ fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> R
 }
 
 fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
+    let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start[..], &args.goal[..]);
     let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
-    let fields = [journey.field(args.metric.unwrap_or(journey.default_metric()), control)?];
+    let fields = [journey.field(name, control)?];
     let distances = [journey.solve(&fields[0], &Stop::Never)?];
     let routes = journey
         .goals

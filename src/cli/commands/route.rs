@@ -21,10 +21,11 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
             check_file(path, &["geojson", "json", "gpx", "csv"], args.overwrite, Some(&args.dem))
         })
         .collect::<Result<Vec<_>>>()?;
+    let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
     let journey =
         Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
-    let field = journey.field(args.metric.unwrap_or(journey.default_metric()), control)?;
+    let field = journey.field(name, control)?;
     let map = journey.solve(&field, &journey.all_goals())?;
     let to_goal = |goal: &Spot| {
         control.check()?;

@@ -28,11 +28,11 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         .iter()
         .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
         .collect::<Result<Vec<_>>>()?;
+    let name = args.ground.metric.chosen(args.metric)?;
     let mut journey = Journey::prepare(&args.dem, (&[], &[]), &args.ground, run, control)?;
     if !formats.iter().any(|format| format == "png") {
         journey = journey.without_heights();
     }
-    let name = args.metric.unwrap_or(journey.default_metric());
     let metric = journey.field(name, control)?;
     let field = TensorField::sample(&metric, control)?;
     let ranks = metric.seed_ranks();
