@@ -32,8 +32,8 @@ pub type Progress = Arc<dyn Fn(&str, f64) + Send + Sync>;
 /// How to run: whom to ask for cancelling, whom to tell of progress.
 #[derive(Clone, Default)]
 pub struct Control {
-    /// Checked often while surfaces are fitted, metrics sampled, distances solved and regions cut; not while files are read,
-    /// routes traced and pictures drawn.
+    /// Checked often while surfaces are fitted, metrics sampled, distances solved, regions cut and maps painted; not while files
+    /// are read and routes traced.
     pub cancel: CancelToken,
     /// Told of progress; `None` (the default) for silence.
     pub progress: Option<Progress>,

@@ -18,7 +18,7 @@ use crate::report::{self, digits};
 /// Everything that lies between a start and its goals, but the metric.
 pub(crate) struct Journey<'a> {
     args: &'a GroundArgs,
-    control: &'a Control,
+    pub(crate) control: &'a Control,
     dem: &'a Path,
     pub(crate) terrain: Terrain,
     pub(crate) surface: HeightSurface,

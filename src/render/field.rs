@@ -8,7 +8,7 @@ use super::relief::VOID;
 use super::sheet::{Item, SIDE, Sheet};
 use super::text::number;
 use crate::export::round_step;
-use crate::{Error, GridFrame, Result};
+use crate::{Control, Error, GridFrame, Result};
 
 /// Colours along the bar.
 const SHADES: usize = 256;
@@ -79,6 +79,8 @@ pub struct FieldPicture<'a> {
     pub title: String,
     /// Pixels of the map's longer side. Default: 1600.
     pub max_side_px: u32,
+    /// How to run: asked for cancelling while the ground is painted.
+    pub control: Control,
 }
 
 impl<'a> FieldPicture<'a> {
@@ -97,13 +99,14 @@ impl<'a> FieldPicture<'a> {
             label: label.into(),
             title: String::new(),
             max_side_px: SIDE,
+            control: Control::default(),
         }
     }
 
     /// Draws the picture.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there is not one value per node or the size is out of bounds.
+    /// [`Error::Usage`] if there is not one value per node or the size is out of bounds; cancelled.
     pub fn render(&self) -> Result<Pixmap> {
         if self.values.len() != self.frame.nodes() {
             return Err(Error::usage(format!(
@@ -127,11 +130,11 @@ impl<'a> FieldPicture<'a> {
             legend.push(Item::Patch { colour: None, label: "no value".into() });
         }
         let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, legend)?;
-        sheet.ground(|grid| {
+        sheet.ground(&self.control, |grid| {
             let [low, high] = range?;
             let share = (self.value(grid)? - low) / (high - low);
             Some(self.gradient.colour(share))
-        });
+        })?;
         Ok(sheet.finish())
     }
 

@@ -9,7 +9,7 @@ use super::relief::Relief;
 use super::sheet::{Item, SIDE, Sheet};
 use super::text;
 use crate::export::Isoline;
-use crate::{Error, GridFrame, Result};
+use crate::{Control, Error, GridFrame, Result};
 
 /// Every so many isolines one is thick and labelled.
 const MAJOR: usize = 5;
@@ -64,6 +64,8 @@ pub struct MapPicture<'a> {
     pub title: String,
     /// Pixels of the map's longer side. Default: 1600.
     pub max_side_px: u32,
+    /// How to run: asked for cancelling while the ground is painted.
+    pub control: Control,
 }
 
 impl<'a> MapPicture<'a> {
@@ -81,13 +83,14 @@ impl<'a> MapPicture<'a> {
             goals: Vec::new(),
             title: String::new(),
             max_side_px: SIDE,
+            control: Control::default(),
         }
     }
 
     /// Draws the map.
     ///
     /// # Errors
-    /// [`Error::Usage`] if heights or barriers are not one per node, or the size is out of bounds.
+    /// [`Error::Usage`] if heights or barriers are not one per node, or the size is out of bounds; cancelled.
     pub fn render(&self) -> Result<Pixmap> {
         let nodes = self.frame.nodes();
         if self.heights.len() != nodes || ![0, nodes].contains(&self.barriers.len()) {
@@ -98,7 +101,7 @@ impl<'a> MapPicture<'a> {
             )));
         }
         let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, self.legend())?;
-        self.draw_ground(&mut sheet);
+        self.draw_ground(&mut sheet)?;
         if let Some(regions) = &self.regions {
             regions.draw_borders(&mut sheet);
             regions.draw_numbers(&mut sheet, |grid| self.node(grid));
@@ -156,16 +159,16 @@ impl<'a> MapPicture<'a> {
         self.frame.index(node.x as usize, node.y as usize)
     }
 
-    fn draw_ground(&self, sheet: &mut Sheet) {
+    fn draw_ground(&self, sheet: &mut Sheet) -> Result<()> {
         let relief = Relief::new(self.frame, self.heights, self.max_side_px as usize);
-        sheet.ground(|grid| {
+        sheet.ground(&self.control, |grid| {
             let colour = relief.at(grid)?;
             let node = self.node(grid);
             let barrier = self.barriers.get(node);
             let region = self.regions.as_ref().and_then(|regions| regions.colour(node));
             let colour = region.map_or(colour, |region| colour.mix(region, 0.5));
             Some(if barrier == Some(&true) { colour.mix(BARRIER, 0.5) } else { colour })
-        });
+        })
     }
 
     fn draw_routes(&self, sheet: &mut Sheet) {
@@ -298,6 +301,14 @@ mod tests {
             sheet.place(DVec2::new(99.5, 49.5)) - sheet.place(DVec2::splat(-0.5)),
             Vec2::new(1600.0, 800.0)
         );
+    }
+
+    #[test]
+    fn who_cancels_gets_no_map() {
+        let frame = frame(3, 3);
+        let map = MapPicture::new(&frame, &[0.0; 9]);
+        map.control.cancel.cancel();
+        assert!(matches!(map.png(), Err(Error::Cancelled)));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::canvas::{Canvas, Rgb};
 use super::relief::VOID;
 use super::text;
 use crate::export::round_step;
-use crate::{Error, GridFrame, Result};
+use crate::{Control, Error, GridFrame, Result};
 
 /// Pixels of the map's longer side unless told otherwise.
 pub(super) const SIDE: u32 = 1600;
@@ -110,12 +110,23 @@ impl Sheet {
     }
 
     /// Paints the ground by `colour` at grid coordinates; `None` is hatched as void.
-    pub(super) fn ground(&mut self, colour: impl Fn(DVec2) -> Option<Rgb> + Sync) {
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(super) fn ground(
+        &mut self,
+        control: &Control,
+        colour: impl Fn(DVec2) -> Option<Rgb> + Sync,
+    ) -> Result<()> {
         let cells = self.cells;
         let period = (12.0 * self.unit) as usize;
         self.canvas.paint(self.map, |x, y| {
+            if control.cancel.is_cancelled() {
+                return Rgb::WHITE;
+            }
             colour(on_grid(x, y, cells)).unwrap_or_else(|| hatching(x + y, period))
         });
+        control.check()
     }
 
     /// Corner and size of the map in pixels, and for each of its pixels `value` at grid coordinates, row-major.

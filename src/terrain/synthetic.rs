@@ -30,7 +30,7 @@ use rayon::prelude::*;
 
 use self::noise::{gradient_noise, hash, ridged, uniform_pair};
 use self::scalar::{Jet, Scalar};
-use crate::{Crs, Error, GridFrame, Ground, HeightJet, Result, Terrain};
+use crate::{Control, Crs, Error, GridFrame, Ground, HeightJet, Result, Terrain};
 
 /// The shapes there are. `h` is the relief, `a` half the longer side, both in metres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -238,14 +238,20 @@ impl Synthetic {
     /// Heights at the nodes in metres, row by row from the north.
     #[must_use]
     pub fn heights(&self) -> Vec<f64> {
+        self.heights_under(&Control::default()).expect("nobody cancels")
+    }
+
+    fn heights_under(&self, control: &Control) -> Result<Vec<f64>> {
         let mut heights = vec![0.0; self.cols * self.rows];
-        heights.par_chunks_mut(self.cols).enumerate().for_each(|(row, line)| {
+        heights.par_chunks_mut(self.cols).enumerate().try_for_each(|(row, line)| {
+            control.check()?;
             for (col, z) in line.iter_mut().enumerate() {
                 let at = self.position(col, row);
                 *z = self.height(at.x, at.y);
             }
-        });
-        heights
+            Ok(())
+        })?;
+        Ok(heights)
     }
 
     /// The terrain with its centre at map coordinates `centre` of `crs`.
@@ -253,6 +259,14 @@ impl Synthetic {
     /// # Errors
     /// [`Error::Usage`] if `crs` is not a plane one in metres or feet, or `centre` is not finite.
     pub fn terrain(&self, crs: Crs, centre: DVec2) -> Result<Terrain> {
+        self.terrain_under(crs, centre, &Control::default())
+    }
+
+    /// [`terrain`](Self::terrain) that can be cancelled.
+    ///
+    /// # Errors
+    /// As [`terrain`](Self::terrain); cancelled.
+    pub fn terrain_under(&self, crs: Crs, centre: DVec2, control: &Control) -> Result<Terrain> {
         let Ground::Plane { metres_per_unit } = crs.ground() else {
             return Err(Error::usage(format!(
                 "a synthetic terrain has cells of equal size in metres, which {} has not; \
@@ -263,7 +277,7 @@ impl Synthetic {
         let north_west = centre + self.position(0, 0) / metres_per_unit;
         let step = DVec2::splat(self.spacing / metres_per_unit);
         let frame = GridFrame::new(self.cols, self.rows, north_west, step, crs.ground())?;
-        Terrain::new(frame, self.heights(), crs)
+        Terrain::new(frame, self.heights_under(control)?, crs)
     }
 
     /// The formula of each kind: metres in, metres out.
@@ -425,6 +439,15 @@ pub fn sphere_distance(radius: f64, delta: Option<f64>, from: DVec2, to: DVec2) 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn who_cancels_gets_no_terrain() {
+        let range = Synthetic::new(SyntheticKind::Range, 9, 9, 30.0).unwrap();
+        let control = Control::default();
+        control.cancel.cancel();
+        let terrain = range.terrain_under(Crs::none(), DVec2::ZERO, &control);
+        assert!(matches!(terrain, Err(Error::Cancelled)));
+    }
 
     fn all(cols: usize, rows: usize, spacing: f64) -> impl Iterator<Item = Synthetic> {
         SyntheticKind::ALL

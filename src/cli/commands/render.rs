@@ -19,7 +19,7 @@ const ISOLINES: usize = 20;
 pub(super) fn run(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<()> {
     check_file(&args.output, &["png"], args.overwrite, Some(&args.dem))?;
     let png = match args.layer.field() {
-        None if args.start.is_empty() => relief(args, run)?,
+        None if args.start.is_empty() => relief(args, run, control)?,
         None => routes(args, run, control)?,
         Some(_) if !args.start.is_empty() => {
             return Err(Error::usage("routes are drawn on the hillshade only; leave --layer out"));
@@ -35,11 +35,12 @@ pub(super) fn run(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result
     .print(run)
 }
 
-fn relief(args: &RenderArgs, run: &RunArgs) -> Result<Vec<u8>> {
+fn relief(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
     let terrain = plan::open(&args.dem, run)?;
     let mut map = MapPicture::new(terrain.frame(), terrain.heights());
     map.title = title(&args.dem);
     map.max_side_px = args.width;
+    map.control = control.clone();
     map.png()
 }
 
@@ -54,6 +55,7 @@ fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> R
     let mut picture = FieldPicture::new(terrain.frame(), &values, gradient, layer.description());
     picture.title = title(&args.dem);
     picture.max_side_px = args.width;
+    picture.control = control.clone();
     picture.png()
 }
 
@@ -91,6 +93,7 @@ pub(super) fn map(
     map.barriers = &barriers;
     map.title = title(dem);
     map.max_side_px = width;
+    map.control = journey.control.clone();
     map.starts = journey.starts.iter().map(|start| start.at).collect();
     map.goals = journey.goals.iter().map(|goal| goal.at).collect();
     for (field, (step, isolines)) in fields.iter().zip(&lines) {

@@ -16,7 +16,7 @@ pub(super) fn run(args: &SynthArgs, run: &RunArgs, control: &Control) -> Result<
     };
     let kind: SyntheticKind = kind.parse()?;
     check_file(output, &["tif", "tiff"], args.overwrite, None)?;
-    let terrain = terrain(args, kind)?;
+    let terrain = terrain(args, kind, control)?;
     control.check()?;
     let frame = terrain.frame();
     let heights = |row: usize, line: &mut [f32]| {
@@ -40,7 +40,7 @@ pub(super) fn run(args: &SynthArgs, run: &RunArgs, control: &Control) -> Result<
     .print(run)
 }
 
-fn terrain(args: &SynthArgs, kind: SyntheticKind) -> Result<Terrain> {
+fn terrain(args: &SynthArgs, kind: SyntheticKind, control: &Control) -> Result<Terrain> {
     let (cols, rows) = args.size;
     let mut synthetic = Synthetic::new(kind, cols, rows, args.spacing)?.with_seed(args.seed);
     if let Some(relief) = args.relief {
@@ -49,7 +49,7 @@ fn terrain(args: &SynthArgs, kind: SyntheticKind) -> Result<Terrain> {
     let crs = args.crs.map_or_else(|| Ok(Crs::none()), Crs::from_epsg)?;
     let metres = crs.ground().metres_per_unit(args.origin.y);
     let to_centre = synthetic.position(cols - 1, 0) / metres;
-    synthetic.terrain(crs, args.origin + to_centre)
+    synthetic.terrain_under(crs, args.origin + to_centre, control)
 }
 
 fn list(run: &RunArgs) -> Result<()> {
