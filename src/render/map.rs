@@ -58,7 +58,7 @@ pub struct MapPicture<'a> {
     pub routes: Vec<RouteLayer<'a>>,
     /// Starts, in grid coordinates.
     pub starts: Vec<DVec2>,
-    /// Goals, in grid coordinates.
+    /// Goals, in grid coordinates: marked G, or numbered from 1 if there are several.
     pub goals: Vec<DVec2>,
     /// The line above the map; empty for none.
     pub title: String,
@@ -114,9 +114,9 @@ impl<'a> MapPicture<'a> {
         let taken: Vec<_> = on_top.map(|&p| sheet.place(p)).collect();
         draw_labels(&mut sheet, labels, &taken);
         self.draw_routes(&mut sheet);
-        let pins = self.starts.iter().map(|&p| (p, 'S', Rgb::GREEN));
-        for (at, letter, colour) in pins.chain(self.goals.iter().map(|&p| (p, 'G', Rgb::PURPLE))) {
-            sheet.pin(at, letter, colour);
+        self.starts.iter().for_each(|&at| sheet.pin(at, "S", Rgb::GREEN));
+        for (i, &at) in self.goals.iter().enumerate() {
+            sheet.pin(at, &self.goal_mark(i), Rgb::PURPLE);
         }
         Ok(sheet.finish())
     }
@@ -129,20 +129,28 @@ impl<'a> MapPicture<'a> {
         canvas::png(&self.render()?)
     }
 
+    /// What the pin of a goal bears.
+    fn goal_mark(&self, goal: usize) -> String {
+        if self.goals.len() == 1 { "G".into() } else { (goal + 1).to_string() }
+    }
+
     fn legend(&self) -> Vec<Item> {
         let mut items = Vec::new();
-        for (places, letter, colour, label) in
-            [(&self.starts, 'S', Rgb::GREEN, "start"), (&self.goals, 'G', Rgb::PURPLE, "goal")]
-        {
+        let goal = if self.goals.len() > 1 { "first goal" } else { "goal" };
+        for (places, mark, colour, label) in [
+            (&self.starts, "S".into(), Rgb::GREEN, "start"),
+            (&self.goals, self.goal_mark(0), Rgb::PURPLE, goal),
+        ] {
             if !places.is_empty() {
-                items.push(Item::Pin { colour, letter, label: label.into() });
+                items.push(Item::Pin { colour, mark, label: label.into() });
             }
         }
-        let line = |colour, cased, label: &String| {
-            (!label.is_empty()).then(|| Item::Line { colour, cased, label: label.clone() })
+        let line = |colour, width, label: &String| {
+            (!label.is_empty()).then(|| Item::Line { colour, width, label: label.clone() })
         };
-        items.extend(self.routes.iter().filter_map(|r| line(r.colour, true, &r.label)));
-        items.extend(self.isolines.iter().filter_map(|l| line(l.colour, false, &l.label)));
+        let routes = self.routes.iter().enumerate();
+        items.extend(routes.filter_map(|(i, r)| line(r.colour, self.route_width(i), &r.label)));
+        items.extend(self.isolines.iter().filter_map(|l| line(l.colour, 2.0, &l.label)));
         if self.barriers.iter().zip(self.heights).any(|(&barrier, h)| barrier && h.is_finite()) {
             let colour = Rgb(0xd8, 0xd2, 0xc0).mix(BARRIER, 0.5);
             items.push(Item::Patch { colour: Some(colour), label: "barrier".into() });
@@ -171,11 +179,15 @@ impl<'a> MapPicture<'a> {
         })
     }
 
+    /// Width of a route on the map and in the legend.
+    fn route_width(&self, route: usize) -> f32 {
+        4.5 + 3.0 * (self.routes.len() - 1 - route).min(3) as f32
+    }
+
     fn draw_routes(&self, sheet: &mut Sheet) {
         let lines: Vec<_> =
             self.routes.iter().map(|route| sheet.lines(&[route.grid.to_vec()])).collect();
-        let width = |i: usize| (4.5 + 3.0 * (lines.len() - 1 - i).min(3) as f32) * sheet.unit;
-        let widths: Vec<_> = (0..lines.len()).map(width).collect();
+        let widths: Vec<_> = (0..lines.len()).map(|i| self.route_width(i) * sheet.unit).collect();
         let casing = 3.5 * sheet.unit;
         for (line, width) in lines.iter().zip(&widths) {
             sheet.canvas.lines(line, width + casing, Rgb::WHITE, 0.9);

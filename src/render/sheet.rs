@@ -30,10 +30,10 @@ pub(super) enum Item {
     Scale { metres: f64 },
     /// An arrow to map north.
     North,
-    /// A line, cased like a route if `cased`.
-    Line { colour: Rgb, cased: bool, label: String },
-    /// A pin.
-    Pin { colour: Rgb, letter: char, label: String },
+    /// A line of some width.
+    Line { colour: Rgb, width: f32, label: String },
+    /// A pin that bears a letter or a number.
+    Pin { colour: Rgb, mark: String, label: String },
     /// A patch of ground: a colour, or the hatching of voids.
     Patch { colour: Option<Rgb>, label: String },
     /// A bar of colours with ticks at shares 0 to 1.
@@ -158,10 +158,10 @@ impl Sheet {
         lines.iter().map(|line| line.iter().map(|&p| self.place(p)).collect()).collect()
     }
 
-    /// A lettered pin at grid coordinates.
-    pub(super) fn pin(&mut self, grid: DVec2, letter: char, colour: Rgb) {
+    /// A pin at grid coordinates that bears a letter or a number.
+    pub(super) fn pin(&mut self, grid: DVec2, mark: &str, colour: Rgb) {
         let at = self.place(grid);
-        pin(&mut self.canvas, at, letter, colour, self.unit);
+        pin(&mut self.canvas, at, mark, colour, self.unit);
     }
 
     /// The finished picture.
@@ -184,13 +184,13 @@ fn hatching(diagonal: usize, period: usize) -> Rgb {
     VOID[usize::from(diagonal % period.max(2) < period.div_ceil(6))]
 }
 
-fn pin(canvas: &mut Canvas, at: Vec2, letter: char, colour: Rgb, unit: f32) {
+fn pin(canvas: &mut Canvas, at: Vec2, mark: &str, colour: Rgb, unit: f32) {
     canvas.disc(at, 14.0 * unit, 3.0 * unit, colour);
-    let letter = letter.to_string();
-    let size = 20.0 * unit;
-    // Half of DejaVu's capital height, 0.729 em, centres the letter.
-    let baseline = at + Vec2::new(-text::width(&letter, size) / 2.0, 0.365 * size);
-    canvas.text(&letter, size, baseline, Rgb::WHITE, 0.0);
+    // Long numbers are set smaller.
+    let size = 20.0 * unit * (22.0 / text::width(mark, 20.0)).min(1.0);
+    // Half of DejaVu's capital height, 0.729 em, centres the mark.
+    let baseline = at + Vec2::new(-text::width(mark, size) / 2.0, 0.365 * size);
+    canvas.text(mark, size, baseline, Rgb::WHITE, 0.0);
 }
 
 /// Places the items in rows of at most `inner` pixels: `(x in pixels, row)` of each. Labels that do
@@ -276,12 +276,11 @@ impl Item {
                     Rgb::INK,
                 );
             }
-            Self::Line { colour, cased, .. } => {
-                let width = if *cased { 5.0 } else { 2.0 } * unit;
-                canvas.lines(&[vec![at, end]], width, *colour, 1.0);
+            Self::Line { colour, width, .. } => {
+                canvas.lines(&[vec![at, end]], width * unit, *colour, 1.0);
             }
-            Self::Pin { colour, letter, .. } => {
-                pin(canvas, at + Vec2::new(17.0 * unit, 0.0), *letter, *colour, unit);
+            Self::Pin { colour, mark, .. } => {
+                pin(canvas, at + Vec2::new(17.0 * unit, 0.0), mark, *colour, unit);
             }
             Self::Patch { colour, .. } => {
                 let [w, h] = [width, 22.0 * unit].map(|v| v as usize);

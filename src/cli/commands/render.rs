@@ -73,7 +73,7 @@ fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>
     map(&journey, &args.dem, &fields, &routes, &distances, args.width)
 }
 
-/// A map of the terrain, the distances under `fields`, and routes of any of these metrics.
+/// A map of the terrain, the distances under `fields`, and routes of any of these metrics, to one goal or one to each.
 pub(super) fn map(
     journey: &Journey<'_>,
     dem: &Path,
@@ -100,12 +100,16 @@ pub(super) fn map(
         let label = format!("{} distance, every {step} {}", field.name(), field.unit());
         map.isolines.push(IsolineLayer { isolines, colour: colour(field.name()), label });
     }
-    for route in routes {
+    for (i, route) in routes.iter().enumerate() {
         let s = &route.summary;
         let length = metres(s.length_m);
+        let goal = match journey.goals.len() {
+            1 => String::new(),
+            _ => format!(" to {}", i + 1),
+        };
         let label = match s.cost_unit.as_str() {
-            "m" => format!("{} route: {length}", s.metric),
-            unit => format!("{} route: {length}, {}", s.metric, distance(s.cost, unit)),
+            "m" => format!("{} route{goal}: {length}", s.metric),
+            unit => format!("{} route{goal}: {length}, {}", s.metric, distance(s.cost, unit)),
         };
         map.routes.push(RouteLayer { grid: &route.grid, colour: colour(&s.metric), label });
     }
