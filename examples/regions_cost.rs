@@ -21,7 +21,7 @@ fn main() -> Result<()> {
         "",
         "threads",
         "regions",
-        STAGES.map(|s| format!("{s:>13}")).concat()
+        STAGES.map(|s| format!("{s:>14}")).concat()
     );
     for nodes in sizes {
         let range = Synthetic::new(SyntheticKind::Range, nodes, nodes, 30.0)?;
@@ -39,7 +39,7 @@ fn main() -> Result<()> {
                     runs.iter().map(|run| run.1[stage]).fold(f64::INFINITY, f64::min)
                 };
                 let times: String =
-                    (0..STAGES.len()).map(|s| format!("{:>13.2}", fastest(s))).collect();
+                    (0..STAGES.len()).map(|s| format!("{:>14.2}", fastest(s))).collect();
                 let name =
                     if matches!(metric, Metric::Curvature(_)) { "curvature" } else { "difference" };
                 println!("{name:>10} {nodes:>4}²     {threads:>7} {:>7} {times}", runs[0].0);

@@ -699,7 +699,7 @@ fn segment_refuses_what_makes_no_sense() {
     folder.bad(
         "segment range.tif --epsilon 20,5 --levels 1",
         2,
-        "1 levels and 2 values of epsilon; there must be a level for each, and at least one",
+        "the number of levels is 1, that of values of epsilon 2; there must be a level for each, and at least one",
     );
     folder.bad(
         "segment range.tif --epsilon 0",
@@ -775,7 +775,7 @@ fn match_refuses_what_it_cannot_compare() {
     folder.bad(
         "match sheet.json --nodes 1x20",
         2,
-        "1 nodes in the first direction of the surface; between 2 and 100000 are possible",
+        "the number of nodes in the first direction of the surface is 1; between 2 and 100000 are possible",
     );
     assert_eq!(folder.run("match range.tif plain.tif range.tif").code, 2);
     assert_eq!(folder.run("match nowhere.json").code, 3);
@@ -884,8 +884,9 @@ fn terrains_of_a_few_cells_are_cut_and_matched() {
         "void.asc",
         "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n-9 -9\n",
     );
-    let empty = folder.run("match range.tif void.asc");
     let said = "error: void.asc: all heights are void; there is no surface to fit\n";
+    assert!(folder.run("surface void.asc").err.ends_with(said));
+    let empty = folder.run("match range.tif void.asc");
     assert!(empty.code == 2 && empty.err.ends_with(said), "{empty:?}");
 }
 

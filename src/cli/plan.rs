@@ -58,12 +58,7 @@ impl<'a> Journey<'a> {
             Some(path) => Some(costs(path, &terrain)?),
             None => None,
         };
-        let surface = HeightSurface::fit(&terrain, &args.fit.options(), control).map_err(
-            |error| match error {
-                Error::Usage(message) => Error::format(dem, message),
-                error => error,
-            },
-        )?;
+        let surface = fit(dem, &terrain, &args.fit, control)?;
         let start_names = start.iter().map(Place::to_string).collect();
         Ok(Self {
             args,
@@ -232,6 +227,19 @@ pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
     let terrain = Terrain::open(dem)?;
     report::notes(&terrain, run);
     Ok(terrain)
+}
+
+/// Fits the surface; an error names the DEM.
+pub(crate) fn fit(
+    dem: &Path,
+    terrain: &Terrain,
+    args: &FitArgs,
+    control: &Control,
+) -> Result<HeightSurface> {
+    HeightSurface::fit(terrain, &args.options(), control).map_err(|error| match error {
+        Error::Usage(message) => Error::format(dem, message),
+        error => error,
+    })
 }
 
 /// The surface that was fitted, in words.

@@ -3,6 +3,7 @@
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+pub(crate) use ridgeway::export::digits;
 use ridgeway::{Error, Result, Terrain};
 use serde_json::Value;
 
@@ -141,18 +142,6 @@ pub(crate) fn coordinate(value: f64, cell: f64) -> String {
     match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
         false => text,
-    }
-}
-
-/// Four significant digits.
-pub(crate) fn digits(value: f64) -> String {
-    let magnitude = value.abs().log10().floor();
-    if value == 0.0 {
-        "0".into()
-    } else if (-3.0..7.0).contains(&magnitude) {
-        format!("{value:.*}", (3.0 - magnitude).max(0.0) as usize)
-    } else {
-        format!("{value:.3e}")
     }
 }
 

@@ -244,7 +244,7 @@ impl TensorField {
         for (periodic, count) in directions.into_iter().zip([self.cols(), self.rows()]) {
             if periodic && count < 3 {
                 return Err(Error::usage(format!(
-                    "a periodic direction of {count} nodes; it must have 3 or more"
+                    "the number of nodes in a periodic direction is {count}; it must be 3 or more"
                 )));
             }
         }

@@ -3,7 +3,7 @@
 use ::gpx::{Gpx, GpxVersion, Track, TrackSegment, Waypoint};
 use glam::DVec2;
 
-use super::round;
+use super::{digits, round};
 use crate::terrain::Crs;
 use crate::{Error, Result, Route};
 
@@ -64,10 +64,10 @@ fn wrapped(lon: f64) -> f64 {
 fn description(route: &Route) -> String {
     let s = &route.summary;
     format!(
-        "metric {}, cost {:.6} {}, length {:.1} m, climb {:.1} m, descent {:.1} m, max grade {:.1} %, \
+        "metric {}, cost {} {}, length {:.1} m, climb {:.1} m, descent {:.1} m, max grade {:.1} %, \
          mean grade {:.1} %",
         s.metric,
-        s.cost,
+        digits(s.cost),
         s.cost_unit,
         s.length_m,
         s.climb_m,

@@ -22,3 +22,16 @@ fn round(value: f64, decimals: i32) -> f64 {
     let scale = 10f64.powi(decimals);
     (value * scale).round() / scale
 }
+
+/// A number to four significant digits; whole ones under ten million are all kept.
+#[must_use]
+pub fn digits(value: f64) -> String {
+    let magnitude = value.abs().log10().floor();
+    if value == 0.0 {
+        "0".into()
+    } else if (-3.0..7.0).contains(&magnitude) {
+        format!("{value:.*}", (3.0 - magnitude).max(0.0) as usize)
+    } else {
+        format!("{value:.3e}")
+    }
+}

@@ -32,7 +32,7 @@ impl SegmentOptions {
     fn check(&self) -> Result<()> {
         if self.levels == 0 || self.epsilons.len() > self.levels {
             return Err(Error::usage(format!(
-                "{} levels and {} values of epsilon; there must be a level for each, and at least one",
+                "the number of levels is {}, that of values of epsilon {}; there must be a level for each, and at least one",
                 self.levels,
                 self.epsilons.len()
             )));

@@ -38,9 +38,9 @@ pub struct Route {
 /// between the nodes as well, so it differs from the distance at the goal by the errors of both.
 ///
 /// # Errors
-/// [`Error::NoWay`] if the front did not reach the goal.
+/// [`Error::NoWay`] if the front did not reach the goal; [`Error::Usage`] if the goal is not on the grid.
 pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> Result<Route> {
-    let grid = shortest(distance, goal, &|at| metric.grid_metric(at)).ok_or_else(|| {
+    let grid = shortest(distance, goal, &|at| metric.grid_metric(at))?.ok_or_else(|| {
         let at = metric.surface().frame().to_map(goal);
         Error::NoWay(format!(
             "there is no way from the start to the goal at {}, {}: voids, barriers or too steep ground lie between",
@@ -51,15 +51,28 @@ pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> R
 }
 
 /// The line that [`trace`] describes under a metric `M` in grid coordinates; `None` if the goal was not reached.
+///
+/// # Errors
+/// The goal is not on the grid.
 fn shortest(
     distance: &DistanceMap,
     goal: DVec2,
     metric: &impl Fn(DVec2) -> Sym2,
-) -> Option<Vec<DVec2>> {
+) -> Result<Option<Vec<DVec2>>> {
     let field = &distance.field;
+    if !field.tiling.contains(goal) {
+        return Err(Error::usage(format!(
+            "the goal at column {}, row {} is not on the grid of {} columns × {} rows",
+            goal.x,
+            goal.y,
+            field.cols(),
+            field.rows()
+        )));
+    }
     let inside = |at| field.tiling.contains(at);
     let clear = |a, b| inside(a) && inside(b) && (is_open_around(field, a, b) || sees(field, a, b));
-    Some(polish::polish(&descent::line(distance, goal)?, metric, &clear))
+    let line = descent::line(distance, goal);
+    Ok(line.map(|line| polish::polish(&line, metric, &clear)))
 }
 
 /// Whether all cells between two points nearby have open corners: then nothing can be in the way.
@@ -106,6 +119,10 @@ mod tests {
                 assert!(cost <= traced, "{metric:?} to {goal}: {cost}, traced {traced}");
                 cost / traced
             });
+            for outside in [DVec2::new(-1.0, 3.0), DVec2::new(1e9, 3.0), DVec2::NAN] {
+                let error = trace(&distance, &field, outside).unwrap_err();
+                assert!(matches!(error, Error::Usage(_)), "{error}");
+            }
             let mean = ratios.sum::<f64>() / 20.0;
             assert!(mean < 1.0 - shorter, "{metric:?}: {mean}");
         }

@@ -25,13 +25,13 @@ pub struct SurfaceRoute {
 /// In a closed direction the line ends at the image of the start that is nearest to the goal.
 ///
 /// # Errors
-/// [`Error::NoWay`] if the front did not reach the goal.
+/// As [`trace`](super::trace).
 pub fn trace_on(
     distance: &DistanceMap,
     metric: &SurfaceMetric<'_>,
     goal: DVec2,
 ) -> Result<SurfaceRoute> {
-    let grid = shortest(distance, goal, &|at| metric.grid_metric(at));
+    let grid = shortest(distance, goal, &|at| metric.grid_metric(at))?;
     let grid = grid.ok_or_else(|| {
         Error::NoWay(format!("there is no way from the start to the goal at {goal}"))
     })?;

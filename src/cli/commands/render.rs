@@ -46,7 +46,7 @@ fn relief(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>
 
 fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
     let terrain = plan::open(&args.dem, run)?;
-    let surface = HeightSurface::fit(&terrain, &args.ground.fit.options(), control)?;
+    let surface = plan::fit(&args.dem, &terrain, &args.ground.fit, control)?;
     let values = layer.sample(&surface);
     let gradient = match layer {
         Layer::Height | Layer::Slope => Gradient::Sequential,

@@ -15,7 +15,7 @@ pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Resul
         check_file(output, &["tif", "tiff"], args.overwrite, Some(&args.dem))?;
     }
     let terrain = plan::open(&args.dem, run)?;
-    let surface = HeightSurface::fit(&terrain, &args.fit.options(), control)?;
+    let surface = plan::fit(&args.dem, &terrain, &args.fit, control)?;
     if let Some(output) = &args.output {
         let make = |layer: Layer| {
             let surface = &surface;

@@ -43,9 +43,9 @@ impl NurbsSurface {
             let least = if self.closed[axis] { 3 } else { 2 };
             if !(least..=MOST).contains(&nodes[axis]) {
                 return Err(Error::usage(format!(
-                    "{} nodes in the {} direction of the surface; between {least} and {MOST} are possible",
-                    nodes[axis],
-                    ["first", "second"][axis]
+                    "the number of nodes in the {} direction of the surface is {}; between {least} and {MOST} are possible",
+                    ["first", "second"][axis],
+                    nodes[axis]
                 )));
             }
             let [first, last] = self.edges(axis).map(|edge| size(&edge) <= SMALL * self.size());
