@@ -9,10 +9,11 @@ pub(crate) fn cover(frame: &GridFrame, shapes: &StartRegion) -> Vec<bool> {
     let mut cells = Cells { frame, touched: vec![false; frame.nodes()] };
     shapes.points.iter().for_each(|&point| cells.segment(point, point));
     shapes.lines.iter().for_each(|line| cells.polyline(line));
-    for area in &shapes.areas {
-        area.iter().for_each(|ring| cells.polyline(ring));
-        cells.interior(area);
-    }
+    shapes.areas.iter().flatten().for_each(|ring| cells.polyline(ring));
+    // And those whose centre lies inside.
+    shapes.nodes_inside(frame.cols(), frame.rows(), |col, row| {
+        cells.touched[frame.index(col, row)] = true;
+    });
     cells.touched
 }
 
@@ -44,32 +45,6 @@ impl Cells<'_> {
                 cell.y += forward.y;
             }
             self.touch(cell);
-        }
-    }
-
-    /// Cells whose centre lies inside by the even-odd rule.
-    fn interior(&mut self, rings: &[Vec<DVec2>]) {
-        let (cols, rows) = (self.frame.cols(), self.frame.rows());
-        let mut crossings = vec![Vec::new(); rows];
-        for ends in rings.iter().flat_map(|ring| ring.windows(2)) {
-            let (top, low) =
-                if ends[0].y < ends[1].y { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
-            // Rows with top.y <= row < low.y; `as` saturates.
-            let (first, end) = (top.y.ceil().max(0.0) as usize, low.y.ceil().max(0.0) as usize);
-            for (row, xs) in crossings.iter_mut().enumerate().take(end).skip(first) {
-                let share = (row as f64 - top.y) / (low.y - top.y);
-                xs.push(top.x + share * (low.x - top.x));
-            }
-        }
-        for (row, mut xs) in crossings.into_iter().enumerate() {
-            xs.sort_by(f64::total_cmp);
-            for pair in xs.chunks_exact(2) {
-                let (first, end) =
-                    (pair[0].ceil().max(0.0) as usize, (pair[1] + 1.0).floor().max(0.0) as usize);
-                for col in first..end.min(cols) {
-                    self.touched[self.frame.index(col, row)] = true;
-                }
-            }
         }
     }
 

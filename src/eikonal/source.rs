@@ -152,6 +152,13 @@ impl StartRegion {
         })
     }
 
+    /// Calls `visit(column, row)` for the nodes of a grid of `cols × rows` that lie in an area, by the even-odd rule; once for each
+    /// area. The cost is that of the rows that the segments cross, and of the nodes.
+    pub fn nodes_inside(&self, cols: usize, rows: usize, mut visit: impl FnMut(usize, usize)) {
+        let tiling = Tiling::new(cols, rows);
+        self.areas.iter().for_each(|rings| inside(&tiling, rings, &mut visit));
+    }
+
     /// Start values in stored units: calls `set(col, row, value)` for nodes on and near the region.
     fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
         let travelled = self.value * field.root_scale();
@@ -181,7 +188,11 @@ impl StartRegion {
             });
         }
         for rings in &self.areas {
-            inside(field, rings, |col, row| set(col, row, 0.0));
+            inside(&field.tiling, rings, |col, row| {
+                if field.is_open(col, row) {
+                    set(col, row, 0.0);
+                }
+            });
         }
     }
 
@@ -279,25 +290,27 @@ fn near(
     }
 }
 
-/// Open nodes inside the rings by the even-odd rule, row by row between the crossings of their segments.
-fn inside(field: &TensorField, rings: &[Vec<DVec2>], mut visit: impl FnMut(usize, usize)) {
+/// Nodes inside the rings by the even-odd rule, row by row between the crossings of their segments.
+fn inside(tiling: &Tiling, rings: &[Vec<DVec2>], mut visit: impl FnMut(usize, usize)) {
     let heights = rings.iter().flatten().map(|at| at.y);
     let (north, south) =
         heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)));
-    for row in field.tiling.span(1, north, south) {
-        let y = row as f64;
-        let segments = rings.iter().flat_map(|ring| closed_segments(ring));
-        let mut crossings: Vec<f64> = segments
-            .filter(|(a, b)| (a.y > y) != (b.y > y))
-            .map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
-            .filter(|x| x.is_finite())
-            .collect();
+    let rows = tiling.span(1, north, south);
+    let mut crossings = vec![Vec::new(); rows.len()];
+    for (a, b) in rings.iter().flat_map(|ring| closed_segments(ring)) {
+        for row in tiling.span(1, a.y.min(b.y), a.y.max(b.y)) {
+            let y = row as f64;
+            let x = a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x);
+            if (a.y > y) != (b.y > y) && x.is_finite() {
+                crossings[(row - rows.start) as usize].push(x);
+            }
+        }
+    }
+    for (row, mut crossings) in rows.zip(crossings) {
         crossings.sort_unstable_by(f64::total_cmp);
         for ends in crossings.chunks_exact(2) {
-            for col in field.tiling.span(0, ends[0], ends[1]) {
-                if let Some((c, r)) = field.tiling.node(col, row)
-                    && field.is_open(c, r)
-                {
+            for col in tiling.span(0, ends[0], ends[1]) {
+                if let Some((c, r)) = tiling.node(col, row) {
                     visit(c, r);
                 }
             }

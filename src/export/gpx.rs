@@ -88,6 +88,7 @@ mod tests {
         let gpx = ::gpx::read(text.as_bytes()).unwrap();
         let track = &gpx.tracks[0];
         assert_eq!(track.name.as_deref(), Some("to <B> & back"));
+        assert!(track.description.as_deref().unwrap().contains("cost 1.000 m, "));
         assert!(track.description.as_deref().unwrap().contains("climb 20.0 m"));
         let point = &track.segments[0].points[1];
         assert_eq!((point.point().x(), point.point().y()), (2.25, 41.5));

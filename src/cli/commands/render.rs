@@ -5,7 +5,7 @@ use std::path::Path;
 use ridgeway::export::{Isoline, isolines, levels_by_step, round_step};
 use ridgeway::render::{FieldPicture, Gradient, IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::route::trace;
-use ridgeway::{Control, DistanceMap, Error, HeightSurface, MetricField, Result, Route, Stop};
+use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Route, Stop};
 use serde_json::json;
 
 use crate::args::{Layer, Picture, RenderArgs, RunArgs};
