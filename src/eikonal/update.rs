@@ -434,11 +434,6 @@ pub(super) fn prepare_shifts(
     let det0 = m.det() as f32;
     let (radius2, alike2) = ((cone.radius * cone.radius) as f32, (cone.alike * cone.alike) as f32);
     let y = (from.y + line as f64) as f32;
-    // Where the whole line is farther away than the cone is taken out.
-    let nearest = greatest(greatest(from.x as f32, -(from.x + (SIDE - 1) as f64) as f32), 0.0);
-    if nearest * nearest + y * y > radius2 {
-        return shifts.fill([0.0; SIDE]);
-    }
     let [dxx, dxy, ddet] = tensors(tile, line, how);
     let mut largest = [0f32; SIDE];
     for i in 0..SIDE {
