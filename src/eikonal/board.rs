@@ -104,12 +104,12 @@ impl Board {
 
 /// What is known of each tile, shared and written as the values are: [`Limits`] as the bits of their numbers.
 #[derive(Debug)]
-pub(super) struct LimitsBoard(Vec<[AtomicU32; 3]>);
+pub(super) struct LimitsBoard(Vec<[AtomicU32; 2]>);
 
 impl LimitsBoard {
     pub(super) fn new(limits: Vec<Limits>) -> Self {
-        let bits = |Limits { slack, shift, longest_step }| {
-            [slack, shift, longest_step].map(|limit: f32| AtomicU32::new(limit.to_bits()))
+        let bits = |Limits { slack, longest_step }| {
+            [slack, longest_step].map(|limit: f32| AtomicU32::new(limit.to_bits()))
         };
         Self(limits.into_iter().map(bits).collect())
     }
@@ -120,7 +120,7 @@ impl LimitsBoard {
 
     pub(super) fn at(&self, tile: usize) -> Limits {
         let limit = |k: usize| f32::from_bits(self.0[tile][k].load(Relaxed));
-        Limits { slack: limit(0), shift: limit(1), longest_step: limit(2) }
+        Limits { slack: limit(0), longest_step: limit(1) }
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = Limits> {
@@ -130,9 +130,9 @@ impl LimitsBoard {
     /// What a solve of the tile found: limits only grow.
     pub(super) fn raise(&self, tile: usize, found: &Limits) {
         let known = self.at(tile);
-        let slack = known.slack.max(found.slack + found.shift);
+        let slack = known.slack.max(found.slack);
         let longest_step = known.longest_step.max(found.longest_step);
         self.0[tile][0].store(slack.to_bits(), Relaxed);
-        self.0[tile][2].store(longest_step.to_bits(), Relaxed);
+        self.0[tile][1].store(longest_step.to_bits(), Relaxed);
     }
 }

@@ -493,7 +493,7 @@ fn wakes(
         let Some(n) = neighbour(tiling, tile, dx, dy) else { return 0.0 };
         let slack = shared.limits.at(n).slack;
         // A periodic direction may be one tile wide.
-        if n == tile { slack.max(limits.slack + limits.shift) } else { slack }
+        if n == tile { slack.max(limits.slack) } else { slack }
     };
     let across = |k: usize, row: usize, beside: usize| {
         let line = |row: usize| lanes(&block[row], 1);

@@ -175,10 +175,8 @@ impl Default for Bench {
 pub(crate) struct Limits {
     /// By how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
     /// is above both ends unless the directions to them make an obtuse angle under `M`; then it may lie below
-    /// one end `a` by up to `−aᵀMb/‖b‖`.
+    /// one end `a` by up to `−aᵀMb/‖b‖`. A cone lowers the neighbours' values besides.
     pub(crate) slack: f32,
-    /// By how much a neighbour's value is lowered by a cone at most.
-    pub(crate) shift: f32,
     /// The longest step of any node.
     pub(crate) longest_step: f32,
 }
@@ -187,6 +185,7 @@ pub(crate) struct Limits {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LaneLimits {
     slack: [f32; SIDE],
+    /// By how much a cone lowers a neighbour's value at most.
     shift: [f32; SIDE],
     longest_step: [f32; SIDE],
 }
@@ -209,7 +208,7 @@ impl Bench {
     pub(crate) fn limits(&self) -> Limits {
         let LaneLimits { slack, shift, longest_step } = &self.limits;
         let all = |lanes: &[f32; SIDE]| lanes.iter().copied().fold(0.0, greatest);
-        Limits { slack: all(slack), shift: all(shift), longest_step: all(longest_step) }
+        Limits { slack: all(slack) + all(shift), longest_step: all(longest_step) }
     }
 
     fn turn(&mut self, by_columns: bool) {
