@@ -15,6 +15,7 @@ mod crew;
 mod edit;
 mod field;
 mod labels;
+mod mirror;
 mod origin;
 pub mod reference;
 mod source;

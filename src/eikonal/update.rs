@@ -24,6 +24,7 @@ use multiversion::multiversion;
 
 use super::cone::Cone;
 use super::field::{SIDE, TensorTile};
+use super::mirror::mirror_block;
 use super::source::Seeds;
 use crate::Sym2;
 
@@ -57,7 +58,7 @@ pub(crate) fn segment(ga: f64, a: DVec2, gb: f64, b: DVec2, metric: Sym2) -> (f6
 }
 
 /// Side of a block: a tile and one node of each neighbour around it.
-const BLOCK: usize = SIDE + 2;
+pub(super) const BLOCK: usize = SIDE + 2;
 
 /// What the update needs of `D` at the [`SIDE`] nodes of a row.
 ///
@@ -214,13 +215,7 @@ impl Bench {
     fn turn(&mut self, by_columns: bool) {
         if self.by_columns != by_columns {
             self.by_columns = by_columns;
-            for row in 0..BLOCK {
-                for col in 0..row {
-                    let value = self.values[row][col];
-                    self.values[row][col] = self.values[col][row];
-                    self.values[col][row] = value;
-                }
-            }
+            mirror_block(&mut self.values);
         }
     }
 

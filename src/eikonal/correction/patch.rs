@@ -36,11 +36,13 @@ impl<'a> Patch<'a> {
     /// The `changed` tiles and those that look at them.
     pub(super) fn around(solution: &'a FirstOrder<'a>, changed: &[bool]) -> Self {
         let Tiling { across, down, .. } = solution.field.tiling;
+        let strips = across.div_ceil(STRIP) * down;
         let mut patch = Self {
             solution,
             keys: solution.values.tiles.par_iter().map(least_of).collect(),
-            strips: Vec::new(),
-            places: vec![None; across.div_ceil(STRIP) * down],
+            // Moving feet to a larger place would take longer than finding some.
+            strips: Vec::with_capacity(strips),
+            places: vec![None; strips],
         };
         for (tile, _) in changed.iter().enumerate().filter(|&(_, &changed)| changed) {
             patch.add_around(tile);

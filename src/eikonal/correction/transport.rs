@@ -7,9 +7,10 @@ use multiversion::multiversion;
 use super::super::board::Board;
 use super::super::crew;
 use super::super::field::{AREA, SIDE, Tiling};
+use super::super::mirror::mirror_block;
 use super::super::tiles::{ITSELF, Job, Queue, Values, WINDOW_CELLS, neighbours, opposite};
 use super::super::update::{ALL, Block, Lines, choose, lanes};
-use super::feet::{self, BEFORE, BEHIND, Feet};
+use super::feet::{self, BEFORE, BEHIND, Feet, Line};
 use super::patch::Patch;
 use super::triangle::Triangle;
 use crate::{Control, Result};
@@ -95,7 +96,7 @@ fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f
     let mut block = [[0.0; SIDE + 2]; SIDE + 2];
     e.load(tile, &mut block);
     if feet.by_columns {
-        transpose(&mut block);
+        mirror_block(&mut block);
     }
     let mut descending = feet.descending;
     let mut sweeps = 0;
@@ -108,7 +109,7 @@ fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f
     }
     outcome.settled = dirty == 0;
     if feet.by_columns {
-        transpose(&mut block);
+        mirror_block(&mut block);
     }
     outcome.changed = changed_sides(tiling, e, tile, &block, tolerance);
     e.store(tile, &block);
@@ -133,17 +134,6 @@ fn changed_sides(tiling: &Tiling, e: &Board, tile: usize, block: &Block, toleran
         changed(east, 0),
     ];
     sides.into_iter().enumerate().fold(0, |set, (side, bit)| set | u8::from(bit) << side)
-}
-
-/// Mirrors a block on its diagonal.
-fn transpose(block: &mut Block) {
-    for row in 0..block.len() {
-        for col in 0..row {
-            let value = block[row][col];
-            block[row][col] = block[col][row];
-            block[col][row] = value;
-        }
-    }
 }
 
 /// One sweep over the lines in `dirty`; those that read what changed since by more than `tolerance`.
@@ -193,15 +183,12 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance
     let (s, n) = (lanes(below, 1), lanes(above, 1));
     let (se, nw, ne, sw) = (lanes(below, 2), lanes(above, 0), lanes(above, 2), lanes(below, 0));
     let mut old = lanes(here, 1);
-    let (theta, rho) = (lanes(&feet.theta, row * SIDE), lanes(&feet.rho, row * SIDE));
-    let mut triangles = [0u8; SIDE];
-    triangles.copy_from_slice(&feet.triangle[row * SIDE..(row + 1) * SIDE]);
+    let Line { triangle: bits, theta, rho } = feet.line(row);
     // What comes from the lines beside, and the shares of the neighbours east and west in the line itself.
     let (mut beside, mut from_east, mut from_west) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
-        let bits = u32::from(triangles[i]);
-        let triangle = Triangle::from_bits(bits);
-        let moves = bits & Triangle::NONE == 0;
+        let triangle = Triangle::from_bits(bits[i]);
+        let moves = bits[i] & Triangle::NONE == 0;
         let b = triangle.diagonal([0.0, se[i], 0.0, sw[i], 0.0, nw[i], 0.0, ne[i]]);
         let across = choose(triangle.negative, n[i], s[i]);
         let own = 1.0 - theta[i];
@@ -214,18 +201,21 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance
     let line = &mut block[row + 1];
     let mut changes = 0;
     while changes < most {
-        let (e, w) = (lanes(line, 2), lanes(line, 0));
+        // Not read back from the line, which would have to wait until it is written.
+        let (mut e, mut w) = ([line[SIDE + 1]; SIDE], [line[0]; SIDE]);
+        e[..SIDE - 1].copy_from_slice(&old[1..]);
+        w[1..].copy_from_slice(&old[..SIDE - 1]);
         let mut changed = 0;
         for i in 0..SIDE {
             let new = beside[i] + from_east[i] * e[i] + from_west[i] * w[i];
             changed |= u32::from((new - old[i]).abs() > tolerance);
             old[i] = new;
         }
-        line[1..=SIDE].copy_from_slice(&old);
         if changed == 0 {
             break;
         }
         changes += 1;
     }
+    line[1..=SIDE].copy_from_slice(&old);
     changes
 }

@@ -20,6 +20,9 @@ impl Triangle {
     const FALLING: u32 = 4;
     /// Bits of no triangle: a node that is not corrected.
     pub(super) const NONE: u32 = 8;
+    /// How many bits there are, and all of them.
+    pub(super) const BITS: u32 = 4;
+    pub(super) const ALL: u32 = 15;
 
     #[inline(always)]
     pub(super) fn from_bits(bits: u32) -> Self {
@@ -104,8 +107,7 @@ impl Triangle {
         let mut offer = |t: u32, a: f32, b: f32, lo: f32, [i, e, beta, hi]: [f32; 4], step: f32| {
             let d = b - a;
             let c = greatest(least(d, hi), lo);
-            let square = greatest(i - e * (c * c), 1e-30);
-            let between = a + (beta * c + square * inverse_root(square));
+            let between = a + (beta * c + greatest(i - e * (c * c), 0.0).sqrt());
             let value = choose(d < lo, b + step, between);
             let better = value < least_value;
             least_value = choose(better, value, least_value);

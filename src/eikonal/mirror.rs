@@ -1,0 +1,64 @@
+//! Tiles mirrored on their diagonal, so that columns can be swept as rows are.
+
+use glam::{Mat4, Vec4};
+
+use super::field::SIDE;
+use super::update::{BLOCK, Block};
+
+/// Side of the squares that are mirrored in registers: number by number takes three times as long.
+const SQUARE: usize = 4;
+
+/// Mirrors a tile and the nodes around it.
+pub(super) fn mirror_block(block: &mut Block) {
+    const LAST: usize = BLOCK - 1;
+    mirror(&mut block[1..LAST], 1);
+    for i in 1..BLOCK {
+        swap(block, i, 0);
+    }
+    for i in 1..LAST {
+        swap(block, LAST, i);
+    }
+}
+
+fn swap(block: &mut Block, row: usize, col: usize) {
+    let value = block[row][col];
+    block[row][col] = block[col][row];
+    block[col][row] = value;
+}
+
+/// Mirrors a tile, the nodes of which begin at place `first` of the lines.
+pub(super) fn mirror<const N: usize>(lines: &mut [[f32; N]], first: usize) {
+    for row in (0..SIDE).step_by(SQUARE) {
+        for col in (0..=row).step_by(SQUARE) {
+            let (here, there) = (square(lines, row, first + col), square(lines, col, first + row));
+            put(lines, col, first + row, here.transpose());
+            put(lines, row, first + col, there.transpose());
+        }
+    }
+}
+
+fn square<const N: usize>(lines: &[[f32; N]], row: usize, col: usize) -> Mat4 {
+    let line = |i: usize| Vec4::from_slice(&lines[row + i][col..col + SQUARE]);
+    Mat4::from_cols(line(0), line(1), line(2), line(3))
+}
+
+fn put<const N: usize>(lines: &mut [[f32; N]], row: usize, col: usize, square: Mat4) {
+    for i in 0..SQUARE {
+        square.col(i).write_to_slice(&mut lines[row + i][col..col + SQUARE]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::array::from_fn;
+
+    use super::*;
+
+    #[test]
+    fn mirrors_all_of_a_block() {
+        let block: Block = from_fn(|row| from_fn(|col| (100 * row + col) as f32));
+        let mut mirrored = block;
+        mirror_block(&mut mirrored);
+        assert_eq!(mirrored, from_fn(|row| from_fn(|col| block[col][row])));
+    }
+}
