@@ -29,6 +29,11 @@ impl Board {
         }
     }
 
+    /// A board none of whose tiles is filled. It takes no time to make: the system gives memory when it is first written.
+    pub(super) fn unfilled(tiling: Tiling, outside: f32) -> Self {
+        Self { tiling, nodes: bytemuck::zeroed_vec(tiling.tiles() * AREA), outside }
+    }
+
     pub(super) fn into_values(self) -> Values {
         let nodes: Vec<f32> =
             self.nodes.into_iter().map(|bits| f32::from_bits(bits.into_inner())).collect();
@@ -91,6 +96,13 @@ impl Board {
         }
     }
 
+    /// Puts values at all places of a tile.
+    pub(super) fn fill(&self, tile: usize, values: &[f32; AREA]) {
+        for (bits, value) in self.tile(tile).iter().zip(values) {
+            bits.store(value.to_bits(), Relaxed);
+        }
+    }
+
     /// Puts the places of a tile beyond the grid outside again.
     fn close_beyond(&self, tile: usize) {
         let [cols, rows] = self.tiling.size(tile);
@@ -121,6 +133,11 @@ impl LimitsBoard {
     pub(super) fn at(&self, tile: usize) -> Limits {
         let limit = |k: usize| f32::from_bits(self.0[tile][k].load(Relaxed));
         Limits { slack: limit(0), longest_step: limit(1) }
+    }
+
+    /// Nothing is known of the tile any more.
+    pub(super) fn forget(&self, tile: usize) {
+        self.0[tile].iter().for_each(|limit| limit.store(0, Relaxed));
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = Limits> {

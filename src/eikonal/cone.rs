@@ -79,8 +79,9 @@ impl Cone {
     /// How far all ground is like that of the point, in rows and columns, up to `most` cells.
     fn alike(&self, field: &TensorField, most: f64) -> f64 {
         let tiling = field.tiling;
-        let gap = |tile: usize| self.gap(field, tile).max_element();
-        let mut tiles: Vec<usize> = (0..tiling.tiles()).filter(|&tile| gap(tile) <= most).collect();
+        let gap = |tile: usize| self.gap(&tiling, tile).max_element();
+        let mut tiles: Vec<usize> =
+            tiling.tiles_around(self.at, most).filter(|&tile| gap(tile) <= most).collect();
         tiles.sort_by(|&a, &b| gap(a).total_cmp(&gap(b)));
         let mut nearest = most as f32 + 1.0;
         for tile in tiles {
@@ -95,9 +96,9 @@ impl Cone {
     }
 
     /// Columns and rows between the point and the nearest node of a tile; 0 inside.
-    fn gap(&self, field: &TensorField, tile: usize) -> DVec2 {
+    fn gap(&self, tiling: &Tiling, tile: usize) -> DVec2 {
         let half = 0.5 * (SIDE - 1) as f64;
-        ((self.at - field.tiling.first(tile) - half).abs() - half).max(DVec2::ZERO)
+        ((self.at - tiling.first(tile) - half).abs() - half).max(DVec2::ZERO)
     }
 
     /// Whether both roots of `λ² − trace λ + det` lie between `1/most` and `most`.
@@ -107,6 +108,14 @@ impl Cone {
             & (most * most - trace * most + det >= 0.0)
             & (trace * most >= 2.0)
             & (1.0 - trace * most + det * (most * most) >= 0.0)
+    }
+
+    /// How far in cells from the point a way of `length`, in stored units, can lead while all ground is like that of the point, a node on
+    /// either side included.
+    fn extent(&self, length: f64) -> f64 {
+        let d = self.metric.inverse();
+        let fastest = 0.5 * (d.xx + d.yy) + (0.5 * (d.xx - d.yy)).hypot(d.xy);
+        length * (f64::from(ALIKE) * fastest).sqrt() + 2.0
     }
 
     /// Its images around a periodic grid whose discs touch the nodes; of more than three in a direction, the middle ones.
@@ -146,13 +155,20 @@ impl Cone {
 /// The cones of the start regions, and which of them each tile lies in.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Cones {
+    tiling: Tiling,
     cones: Vec<Cone>,
-    /// Index of the tile's cone plus one; 0 if it lies in none. Empty if there are no cones.
+    /// Index of the tile's cone plus one; 0 if it lies in none. Empty if the cones are those of one point: which is the tile's is
+    /// then quickly told.
     of_tile: Vec<u32>,
 }
 
 impl Cones {
     pub(crate) fn new(field: &TensorField, starts: &[StartRegion]) -> Self {
+        Self::within(field, starts, f64::INFINITY)
+    }
+
+    /// Cones that are the same up to a `distance` (stored units); only ground that can be reached so far is looked at.
+    pub(crate) fn within(field: &TensorField, starts: &[StartRegion], distance: f64) -> Self {
         let of_start = |start: &StartRegion| {
             let travelled = start.value * field.root_scale();
             let corners = start.corners();
@@ -173,14 +189,15 @@ impl Cones {
         for (number, cone) in cones.iter_mut().enumerate() {
             cone.number = number;
             cone.radius = radius;
-            let most = radius.min(0.5 * share.sqrt());
+            let most = radius.min(0.5 * share.sqrt()).min(cone.extent(distance));
             let alike = cone.images(&tiling).map(|image| image.alike(field, most));
             cone.alike = alike.fold(most, f64::min);
         }
+        let tiles = if cones.len() > 1 { tiling.tiles() } else { 0 };
         let cones: Vec<Cone> = cones.into_iter().flat_map(|cone| cone.images(&tiling)).collect();
         let of_tile =
-            (0..tiling.tiles()).into_par_iter().map(|tile| nearest(&cones, field, tile)).collect();
-        Self { cones, of_tile }
+            (0..tiles).into_par_iter().map(|tile| nearest(&cones, &tiling, tile)).collect();
+        Self { tiling, cones, of_tile }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -189,8 +206,12 @@ impl Cones {
 
     /// The cone that a tile lies in.
     pub(crate) fn of_tile(&self, tile: usize) -> Option<&Cone> {
-        let index = self.of_tile.get(tile)?.checked_sub(1)?;
-        self.cones.get(index as usize)
+        if self.is_empty() {
+            return None;
+        }
+        let found = self.of_tile.get(tile).copied();
+        let index = found.unwrap_or_else(|| nearest(&self.cones, &self.tiling, tile));
+        self.cones.get(index.checked_sub(1)? as usize)
     }
 
     /// The cone that is taken out at all the given nodes, seen from there.
@@ -249,10 +270,10 @@ impl Cones {
 /// The cone that brings the least distance to all of a tile under its own metric, if it reaches into the tile, as for
 /// [`Cones::of_tile`]. Where another that is not its image brings less somewhere, none may be taken out: its front would meet
 /// the shifts of a foreign cone, each of which lowers it a little.
-fn nearest(cones: &[Cone], field: &TensorField, tile: usize) -> u32 {
-    let [cols, rows] = field.tiling.size(tile);
+fn nearest(cones: &[Cone], tiling: &Tiling, tile: usize) -> u32 {
+    let [cols, rows] = tiling.size(tile);
     let half = 0.5 * (DVec2::new(cols as f64, rows as f64) - 1.0);
-    let middle = field.tiling.first(tile) + half;
+    let middle = tiling.first(tile) + half;
     let nearest_to = |at: DVec2| {
         let length = |cone: &Cone| cone.travelled + cone.value(at - cone.at);
         let lengths = cones.iter().map(length).enumerate();
@@ -260,7 +281,7 @@ fn nearest(cones: &[Cone], field: &TensorField, tile: usize) -> u32 {
     };
     let index = nearest_to(middle);
     let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
-    let reaches = cones[index].gap(field, tile).length() <= cones[index].radius;
+    let reaches = cones[index].gap(tiling, tile).length() <= cones[index].radius;
     let alone = || {
         // The places of one cone are convex where all are alike.
         let corner = |(x, y)| middle + DVec2::new(x, y) * (half + 1.0);

@@ -76,6 +76,21 @@ pub(super) fn run<O: Default + Send, B: Default>(
     work: impl Fn(&mut B, u64) -> O + Sync,
 ) -> Result<()> {
     let members = rayon::current_num_threads();
+    let mut bench = B::default();
+    let (mut jobs, mut outcomes) = (Vec::new(), Vec::new());
+    let mut before = 0;
+    loop {
+        lead(&mut jobs, &outcomes)?;
+        if jobs.is_empty() {
+            return Ok(());
+        }
+        if members > 1 && before >= ALONE && jobs.len() >= MIN_PARALLEL {
+            break;
+        }
+        before += jobs.len();
+        outcomes.clear();
+        outcomes.extend(jobs.iter().map(|&job| work(&mut bench, job)));
+    }
     let deck = Deck {
         round: Apart::default(),
         done: Apart::default(),
@@ -87,28 +102,21 @@ pub(super) fn run<O: Default + Send, B: Default>(
     rayon::in_place_scope(|scope| {
         let _over = OnDrop(|| deck.round.0.store(Round::OVER, Ordering::Release));
         let (deck, work) = (&deck, &work);
-        let mut bench = B::default();
+        for helper in 1..members {
+            scope.spawn(move |_| deck.help(helper, work));
+        }
         let mut mine = Vec::new();
-        let (mut jobs, mut outcomes) = (Vec::new(), Vec::new());
-        let (mut helpers, mut before) = (0, 0);
         for number in 2.. {
-            lead(&mut jobs, &outcomes)?;
-            if jobs.is_empty() {
-                break;
-            }
-            let pays = jobs.len() >= MIN_PARALLEL && before >= ALONE;
-            before += jobs.len();
-            while pays && helpers + 1 < members {
-                helpers += 1;
-                let member = helpers;
-                scope.spawn(move |_| deck.help(member, work));
-            }
             let round = deck.begin(number, &jobs);
             deck.take_jobs(0, round, &mut mine, |job| work(&mut bench, job));
             while deck.done.0.load(Ordering::Acquire) < jobs.len() {
                 hint::spin_loop();
             }
-            deck.collect(helpers, jobs.len(), &mut outcomes);
+            deck.collect(jobs.len(), &mut outcomes);
+            lead(&mut jobs, &outcomes)?;
+            if jobs.is_empty() {
+                break;
+            }
         }
         Ok(())
     })
@@ -160,9 +168,9 @@ impl<O: Default> Deck<O> {
     }
 
     /// The outcomes of a round in the order of its jobs.
-    fn collect(&self, helpers: usize, jobs: usize, outcomes: &mut Vec<O>) {
+    fn collect(&self, jobs: usize, outcomes: &mut Vec<O>) {
         outcomes.resize_with(jobs, O::default);
-        for tray in &self.trays[..=helpers] {
+        for tray in &self.trays {
             let mut tray = tray.0.lock().unwrap_or_else(PoisonError::into_inner);
             for (place, outcome) in tray.drain(..) {
                 outcomes[place] = outcome;

@@ -30,7 +30,7 @@ impl TensorTile {
 }
 
 /// How the nodes of a grid are cut into tiles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tiling {
     pub(crate) cols: usize,
     pub(crate) rows: usize,
@@ -56,6 +56,18 @@ impl Tiling {
     /// The first node of a tile.
     pub(crate) fn first(&self, tile: usize) -> DVec2 {
         DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64
+    }
+
+    /// The tiles that touch the square `radius` around a point, and perhaps some beside them.
+    pub(super) fn tiles_around(&self, at: DVec2, radius: f64) -> impl Iterator<Item = usize> {
+        let span = |at: f64, count: usize| {
+            let [from, to] =
+                [at - radius - 1.0, at + radius + 1.0].map(|x| (x / SIDE as f64).floor());
+            // An `as` clamps to what is there.
+            from as usize..count.min((to + 1.0) as usize)
+        };
+        let (across, columns) = (self.across, span(at.x, self.across));
+        span(at.y, self.down).flat_map(move |y| columns.clone().map(move |x| y * across + x))
     }
 
     /// Columns and rows of a tile.

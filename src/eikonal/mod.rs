@@ -7,6 +7,7 @@
 //! ns of one core and 16 bytes per node, at high accuracy 90 to 160 ns and 24 bytes. [`mod@reference`] is the slow
 //! judge; `docs/solver.md` has the measurements.
 
+mod ball;
 mod board;
 mod cell;
 mod cone;
@@ -26,6 +27,7 @@ mod update;
 use glam::DVec2;
 use rayon::prelude::*;
 
+pub(crate) use self::ball::Balls;
 use self::cone::{Cone, Cones};
 use self::correction::{Correction, FirstOrder};
 pub use self::field::TensorField;
@@ -111,9 +113,7 @@ impl Solver {
             cones = Cones::default();
             solution = solve(&cones)?;
         }
-        let Solution { values, limits, statistics } = solution.ok_or_else(|| {
-            Error::usage("the distance does not settle on this metric; its tensors are too extreme")
-        })?;
+        let Solution { values, limits, statistics } = solution.ok_or_else(unsettled)?;
         control.report("solving distance", 1.0);
         let map = DistanceMap {
             field,
@@ -189,6 +189,10 @@ impl Solver {
         let again = self.solve_field(map.field, &map.starts, stop, control)?;
         Ok(DistanceMap { unit: map.unit, frame: map.frame, ..again })
     }
+}
+
+fn unsettled() -> Error {
+    Error::usage("the distance does not settle on this metric; its tensors are too extreme")
 }
 
 /// Distance from the nearest start region at every node.

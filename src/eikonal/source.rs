@@ -81,13 +81,30 @@ pub(super) fn seeds(
     starts: &[StartRegion],
 ) -> Result<Vec<Option<Box<Seeds>>>> {
     let mut seeds = vec![None; field.tiling.tiles()];
+    add_seeds(field, starts, &mut seeds)?;
+    Ok(seeds)
+}
+
+/// Adds the start values to those of the tiles; gives the tiles that had none before, in ascending order.
+///
+/// # Errors
+/// As [`seed_all`].
+pub(super) fn add_seeds(
+    field: &TensorField,
+    starts: &[StartRegion],
+    seeds: &mut [Option<Box<Seeds>>],
+) -> Result<Vec<usize>> {
+    let mut tiles = Vec::new();
     seed_all(field, starts, |col, row, value, _| {
         let (tile, place) = field.tiling.place(col, row);
-        let seeds: &mut Box<Seeds> =
-            seeds[tile].get_or_insert_with(|| Box::new([f32::INFINITY; AREA]));
+        let seeds = seeds[tile].get_or_insert_with(|| {
+            tiles.push(tile);
+            Box::new([f32::INFINITY; AREA])
+        });
         seeds[place] = seeds[place].min(value);
     })?;
-    Ok(seeds)
+    tiles.sort_unstable();
+    Ok(tiles)
 }
 
 /// The best of [`StartRegion::foot`] over all regions.

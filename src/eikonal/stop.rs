@@ -38,7 +38,7 @@ impl Stop {
     }
 
     /// The largest value to be reported, in stored units.
-    fn largest(&self, field: &TensorField) -> f32 {
+    pub(super) fn largest(&self, field: &TensorField) -> f32 {
         match self {
             Self::Distance(d) => (d * field.root_scale()).min(UNREACHED.into()) as f32,
             _ => UNREACHED,
@@ -54,6 +54,8 @@ pub(super) struct Standing<'a> {
     pub(super) limits: &'a LimitsBoard,
     /// At most so many nodes have a value.
     pub(super) reached: usize,
+    /// The greatest slack of any tile.
+    pub(super) slack: f32,
     /// Nothing below this value is news to any node; infinite when all is done.
     pub(super) news: f32,
 }
@@ -78,8 +80,7 @@ impl Standing<'_> {
         if !matches!(stop, Stop::Distance(_)) {
             return UNREACHED;
         }
-        let slack = self.limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
-        stop.largest(self.field) + slack
+        stop.largest(self.field) + self.slack
     }
 
     fn final_nodes(&self) -> usize {
@@ -108,7 +109,7 @@ impl Standing<'_> {
 
 /// Whether no news of this value and above will change a node: a neighbour improves it only if its value is below the
 /// node's and the slack.
-fn is_final(value: f32, limits: &Limits, news: f32) -> bool {
+pub(super) fn is_final(value: f32, limits: &Limits, news: f32) -> bool {
     value < UNREACHED && value + limits.slack < news
 }
 

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::board::{Board, LimitsBoard};
 use super::cone::Cones;
 use super::crew;
-use super::field::{AREA, SIDE, TensorField, Tiling, wrap};
+use super::field::{AREA, SIDE, TensorField, TensorTile, Tiling, wrap};
 use super::source::Seeds;
 use super::stop::{self, Standing, Stop};
 use super::update::{
@@ -31,21 +31,15 @@ pub(crate) struct Values {
 impl Values {
     /// The start values; the rest unreached.
     pub(crate) fn seeded(field: &TensorField, seeds: &[Option<Box<Seeds>>]) -> Self {
-        let fill = |tensors: &super::field::TensorTile| {
-            tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY })
-        };
-        let tiles = field.tiles.par_iter().map(fill).collect();
-        let mut values = Self { tiling: field.tiling, tiles };
-        values.seed(seeds);
-        values
+        let tiles = field.tiles.par_iter().zip(seeds);
+        let tiles = tiles.map(|(tensors, seeds)| at_start(tensors, seeds.as_deref())).collect();
+        Self { tiling: field.tiling, tiles }
     }
 
     /// Lowers values to those of the start.
     pub(super) fn seed(&mut self, seeds: &[Option<Box<Seeds>>]) {
         for (tile, seeds) in self.tiles.iter_mut().zip(seeds) {
-            for (value, seed) in tile.iter_mut().zip(seeds.iter().flat_map(|seeds| seeds.iter())) {
-                *value = value.min(*seed);
-            }
+            seeds.iter().for_each(|seeds| lower(tile, seeds));
         }
     }
 
@@ -63,6 +57,19 @@ impl Values {
         let (tile, place) = self.tiling.place(col, row);
         let old = &mut self.tiles[tile][place];
         *old = old.min(value);
+    }
+}
+
+/// The values of a tile before the solve: those of the start, the rest unreached.
+pub(super) fn at_start(tensors: &TensorTile, seeds: Option<&Seeds>) -> [f32; AREA] {
+    let mut values = tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY });
+    seeds.into_iter().for_each(|seeds| lower(&mut values, seeds));
+    values
+}
+
+fn lower(values: &mut [f32; AREA], seeds: &Seeds) {
+    for (value, seed) in values.iter_mut().zip(seeds) {
+        *value = value.min(*seed);
     }
 }
 
@@ -86,12 +93,14 @@ struct Outcome {
     wakes: [f32; 8],
     /// The least value of the tile if it does not stand still yet; infinite if it does.
     unsettled: f32,
+    /// See [`Limits::slack`].
+    slack: f32,
     sweeps: u32,
 }
 
 impl Default for Outcome {
     fn default() -> Self {
-        Self { wakes: [f32::INFINITY; 8], unsettled: f32::INFINITY, sweeps: 0 }
+        Self { wakes: [f32::INFINITY; 8], unsettled: f32::INFINITY, slack: 0.0, sweeps: 0 }
     }
 }
 
@@ -153,6 +162,16 @@ impl Queue {
             first: vec![0; tiles],
             activations: vec![0; tiles],
             taken: vec![0; tiles],
+        }
+    }
+
+    /// Forgets all, where only the given tiles and those that wait were ever touched.
+    fn clear(&mut self, tiles: &[usize]) {
+        for tile in self.waiting.drain(..) {
+            self.key[tile as usize] = f32::INFINITY;
+        }
+        for &tile in tiles {
+            (self.activations[tile], self.taken[tile]) = (0, 0);
         }
     }
 
@@ -245,9 +264,73 @@ pub(super) fn neighbours(tiling: &Tiling, tile: usize) -> impl Iterator<Item = (
 
 /// What the solvers of a round share.
 #[derive(Debug)]
-struct Shared {
-    board: Board,
-    limits: LimitsBoard,
+pub(super) struct Shared {
+    pub(super) board: Board,
+    pub(super) limits: LimitsBoard,
+}
+
+/// The memory of a solve.
+#[derive(Debug)]
+pub(super) struct Desk {
+    queue: Queue,
+    pub(super) shared: Shared,
+    /// How many nodes have a value from before.
+    reached: usize,
+    /// The greatest slack of any tile.
+    slack: f32,
+}
+
+impl Desk {
+    fn new(board: Board, limits: Vec<Limits>) -> Self {
+        let slack = limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
+        let queue = Queue::new(limits.len());
+        Self {
+            queue,
+            shared: Shared { board, limits: LimitsBoard::new(limits) },
+            reached: 0,
+            slack,
+        }
+    }
+
+    /// One with an unfilled board.
+    pub(super) fn empty(tiling: Tiling) -> Self {
+        let board = Board::unfilled(tiling, f32::INFINITY);
+        Self::new(board, vec![Limits::default(); tiling.tiles()])
+    }
+
+    /// Wakes a tile that holds start values, and the neighbours that some lie beside.
+    pub(super) fn wake(&mut self, tiling: &Tiling, tile: usize, seeds: &Seeds) {
+        let [cols, rows] = tiling.size(tile);
+        let beside = |along: isize, at: usize, count: usize| match along {
+            0 => true,
+            1 => at + 1 == count,
+            _ => at == 0,
+        };
+        let least = |side: usize| {
+            let (dx, dy) = SIDES[side];
+            let place = |&i: &usize| beside(dx, i % SIDE, cols) && beside(dy, i / SIDE, rows);
+            (0..AREA).filter(place).map(|i| seeds[i]).fold(f32::INFINITY, f32::min)
+        };
+        self.queue.wake(tile, least(ITSELF), ITSELF);
+        for (side, n) in neighbours(tiling, tile) {
+            let key = least(side);
+            if key < f32::INFINITY {
+                self.queue.wake(n, key, opposite(side));
+            }
+        }
+    }
+
+    /// Whether the tile was solved.
+    pub(super) fn is_solved(&self, tile: usize) -> bool {
+        self.queue.activations[tile] > 0
+    }
+
+    /// Forgets a solve of which only the given tiles were solved or beside ones that were. Their values stay.
+    pub(super) fn clear(&mut self, tiles: &[usize]) {
+        self.queue.clear(tiles);
+        tiles.iter().for_each(|&tile| self.shared.limits.forget(tile));
+        (self.reached, self.slack) = (0, 0.0);
+    }
 }
 
 /// Which of the values given to a solve are news.
@@ -285,37 +368,64 @@ pub(super) struct Equation<'a> {
 /// end. What is not final then is unreached. `limits` are those of the solution that the values are from. `None` if the
 /// values do not settle.
 pub(super) fn solve(
-    &Equation { field, cones, seeds, tolerance }: &Equation<'_>,
+    equation: &Equation<'_>,
     values: Values,
     limits: Vec<Limits>,
     news: News<'_>,
     stop: &Stop,
     control: &Control,
 ) -> Result<Option<Solution>> {
+    let field = equation.field;
     let tiling = field.tiling;
-    let mut queue = Queue::new(tiling.tiles());
-    let board = Board::new(values, f32::INFINITY);
-    let had = match news {
-        News::All => {
-            wake_start(field, seeds, &mut queue);
-            0
-        }
+    let mut desk = Desk::new(Board::new(values, f32::INFINITY), limits);
+    match news {
+        News::All => wake_start(field, equation.seeds, &mut desk.queue),
         News::Since { before, edited } => {
-            wake_front(&tiling, before, &board, edited, &mut queue);
-            before.reached()
+            wake_front(&tiling, before, &desk.shared.board, edited, &mut desk.queue);
+            desk.reached = before.reached();
         }
         News::Lost(keys) => {
-            wake_around(&tiling, keys.iter().copied(), &mut queue);
-            0
+            wake_around(&tiling, keys.iter().copied(), &mut desk.queue);
         }
-    };
+    }
     let rule = if matches!(news, News::Lost(_)) { Rule::Forget } else { Rule::Lower };
-    let mut least = f32::INFINITY;
+    let End { settles, news, statistics } =
+        relax(equation, rule, stop, &mut desk, |_, _| (), control)?;
+    let Shared { board, limits } = desk.shared;
+    let (mut values, limits) = (board.into_values(), limits.into_limits());
+    if *stop != Stop::Never {
+        stop::mask(&mut values, field, &limits, news, stop);
+    }
+    Ok(settles.then_some(Solution { values, limits, statistics }))
+}
+
+/// How a relaxation ended.
+#[derive(Debug)]
+pub(super) struct End {
+    /// Whether all tiles came to a standstill, or would have.
+    pub(super) settles: bool,
+    /// Nothing below this value is news to any node; infinite when all is done.
+    pub(super) news: f32,
+    statistics: Statistics,
+}
+
+/// Solves the tiles that wait and those that they wake, in rounds, until `stop` allows to end. Before
+/// a round `open` is told its jobs.
+pub(super) fn relax(
+    &Equation { field, cones, seeds, tolerance }: &Equation<'_>,
+    rule: Rule,
+    stop: &Stop,
+    Desk { queue, shared, reached, slack }: &mut Desk,
+    mut open: impl FnMut(&[u64], &Shared),
+    control: &Control,
+) -> Result<End> {
+    let tiling = field.tiling;
     let window = WINDOW_CELLS * field.mean_step;
     let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
+    let mut news = f32::INFINITY;
     let mut settles = true;
     let mut statistics = Statistics::default();
-    let shared = Shared { board, limits: LimitsBoard::new(limits) };
+    let shared = &*shared;
     let work = |bench: &mut Bench, job: u64| {
         let job = Job::from_bits(job);
         let tile = job.tile as usize;
@@ -323,7 +433,7 @@ pub(super) fn solve(
         let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
-        solve_tile(bench, &tiling, &input, rule, &shared, job)
+        solve_tile(bench, &tiling, &input, rule, shared, job)
     };
     let lead = |jobs: &mut Vec<u64>, outcomes: &[Outcome]| -> Result<()> {
         for (job, outcome) in jobs.drain(..).zip(outcomes) {
@@ -334,7 +444,8 @@ pub(super) fn solve(
             statistics.activations += 1;
             statistics.tiles += usize::from(*activations == 1);
             statistics.sweeps += outcome.sweeps as usize;
-            settle(&tiling, &mut queue, tile, outcome);
+            *slack = slack.max(outcome.slack);
+            settle(&tiling, queue, tile, outcome);
         }
         control.check()?;
         if !settles {
@@ -343,24 +454,21 @@ pub(super) fn solve(
         if statistics.rounds.is_multiple_of(64) {
             control.report("solving distance", statistics.tiles as f64 / tiling.tiles() as f64);
         }
-        least = queue.least_key();
-        let reached = had + statistics.tiles * AREA;
-        let Shared { board, limits } = &shared;
-        let standing = Standing { field, board, limits, reached, news: least };
+        news = queue.least_key();
+        let reached = *reached + statistics.tiles * AREA;
+        let Shared { board, limits } = shared;
+        let standing = Standing { field, board, limits, reached, slack: *slack, news };
         if queue.waiting.is_empty() || standing.allows(stop) {
             return Ok(());
         }
         statistics.rounds += 1;
-        let limit = (least + window).min(standing.last_news(stop));
+        let limit = (news + window).min(standing.last_news(stop));
         queue.take(&tiling, limit, statistics.rounds as u32, jobs);
+        open(jobs, shared);
         Ok(())
     };
     crew::run(tiling.tiles(), lead, work)?;
-    let (mut values, limits) = (shared.board.into_values(), shared.limits.into_limits());
-    if *stop != Stop::Never {
-        stop::mask(&mut values, field, &limits, least, stop);
-    }
-    Ok(settles.then_some(Solution { values, limits, statistics }))
+    Ok(End { settles, news, statistics })
 }
 
 /// Wakes every tile that holds a start value, and its neighbours, on all sides.
@@ -459,6 +567,7 @@ fn solve_tile(
     }
     let limits = bench.limits();
     shared.limits.raise(tile, &limits);
+    outcome.slack = limits.slack;
     if changed {
         let block = bench.values();
         let settled = (owed, changes) == ([0; 2], [0; 2]);

@@ -3,12 +3,9 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::eikonal::TensorField;
+use crate::eikonal::{Balls, TensorField};
 use crate::metric::SurfaceMetric;
-use crate::{Control, DistanceMap, Error, MetricField, ParametricSurface, Result, Solver, Stop};
-
-/// Half the side of the window in which the first cluster is solved, in nodes.
-const REACH: usize = 24;
+use crate::{Control, Error, MetricField, ParametricSurface, Result};
 
 /// Most clusters of a cover: beyond this `ε` is surely a mistake.
 const MOST: usize = 1 << 16;
@@ -45,7 +42,8 @@ impl SurfaceMetric<'_> {
 /// distance. Empty if the node is closed.
 ///
 /// # Cost
-/// That of a solve in a window around the cluster, some four times its size: what lies beyond is not looked at.
+/// That of the tiles of 16 × 16 nodes that hold the cluster; what lies beyond those beside them is not looked at. Besides, 4 bytes per node of
+/// the grid are set aside.
 ///
 /// # Errors
 /// [`Error::Usage`] if the seed is not on the grid or `epsilon` is no number, 0 or more; [`Error::Cancelled`].
@@ -59,76 +57,7 @@ pub fn cluster(
     if col >= field.cols() || row >= field.rows() {
         return Err(Error::usage(format!("the seed ({col}, {row}) is not on the grid")));
     }
-    Clusters { field, reach: REACH, looked_at: 0 }.around(seed, epsilon, control)
-}
-
-/// Finds one cluster after the other.
-struct Clusters<'a> {
-    field: &'a TensorField,
-    /// Half the side of the window that the next cluster is solved in, in nodes: a little more than the last one took.
-    reach: usize,
-    /// Nodes of all windows so far.
-    looked_at: usize,
-}
-
-impl Clusters<'_> {
-    /// See [`cluster`].
-    fn around(
-        &mut self,
-        [col, row]: [usize; 2],
-        epsilon: f64,
-        control: &Control,
-    ) -> Result<Vec<(usize, f32)>> {
-        let field = self.field;
-        if !field.is_open(col, row) {
-            return Ok(Vec::new());
-        }
-        let stop = Stop::Distance(epsilon);
-        loop {
-            let span = |at: usize, count: usize| {
-                at.saturating_sub(self.reach)..count.min(at + self.reach + 1)
-            };
-            let (part, first) = field.crop([span(col, field.cols()), span(row, field.rows())]);
-            let start = DVec2::new((col - first[0]) as f64, (row - first[1]) as f64);
-            let map = Solver::default().solve_field(part, &[start.into()], &stop, control)?;
-            self.looked_at += map.cols() * map.rows();
-            if let Some(nodes) = held(&map, first, field) {
-                // A periodic direction is whole in any window.
-                let [around, about] = field.tiling.periodic;
-                let far = |&(place, _): &(usize, f32)| {
-                    let across = (place % field.cols()).abs_diff(col);
-                    let down = (place / field.cols()).abs_diff(row);
-                    (if around { 0 } else { across }).max(if about { 0 } else { down })
-                };
-                let farthest = nodes.iter().map(far).max().unwrap_or(0);
-                self.reach = farthest + farthest / 4 + 2;
-                return Ok(nodes);
-            }
-            self.reach *= 2;
-        }
-    }
-}
-
-/// The reached nodes of a map of a part of the field that begins at `first`; `None` if some lie at its border, beyond which there is more.
-fn held(map: &DistanceMap, first: [usize; 2], field: &TensorField) -> Option<Vec<(usize, f32)>> {
-    let at_border = |at: usize, count: usize, first: usize, all: usize| {
-        at == 0 && first > 0 || at + 1 == count && first + count < all
-    };
-    let mut nodes = Vec::new();
-    for row in 0..map.rows() {
-        for col in 0..map.cols() {
-            let value = map.at_node(col, row) as f32;
-            if value.is_finite() {
-                if at_border(col, map.cols(), first[0], field.cols())
-                    || at_border(row, map.rows(), first[1], field.rows())
-                {
-                    return None;
-                }
-                nodes.push(((first[1] + row) * field.cols() + first[0] + col, value));
-            }
-        }
-    }
-    Some(nodes)
+    Ok(Balls::new(field).around(seed, epsilon, control)?.collect())
 }
 
 /// Clusters that together hold all open nodes.
@@ -158,16 +87,13 @@ pub(super) fn cover(
     order.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut seeds = Vec::new();
     let quiet = control.quiet();
-    // For the largest distance all is looked at.
-    let reach = if epsilon.is_some() { REACH } else { cols.max(field.rows()) };
-    let mut clusters = Clusters { field, reach, looked_at: 0 };
-    let mut around =
-        |place: usize, epsilon: f64| clusters.around([place % cols, place / cols], epsilon, &quiet);
+    let mut balls = Balls::new(field);
+    let coordinates = |place: usize| [place % cols, place / cols];
     let epsilon = match (epsilon, order.first()) {
         (Some(epsilon), _) => epsilon,
         (None, Some(&(_, first))) => {
-            let all = around(first, f64::INFINITY)?;
-            0.5 * f64::from(all.iter().fold(0f32, |most, &(_, value)| most.max(value)))
+            let all = balls.around(coordinates(first), f64::INFINITY, &quiet)?;
+            0.5 * f64::from(all.fold(0f32, |most, (_, value)| most.max(value)))
         }
         (None, None) => 0.0,
     };
@@ -183,7 +109,8 @@ pub(super) fn cover(
             )));
         }
         control.report("covering", done as f64 / order.len() as f64);
-        around(seed, epsilon)?.iter().for_each(|&(place, _)| is_held[place] = true);
+        let held = balls.around(coordinates(seed), epsilon, &quiet)?;
+        held.for_each(|(place, _)| is_held[place] = true);
         // Where the metric is too extreme to seed a node, its cluster is empty.
         is_held[seed] = true;
         seeds.push(seed);
@@ -194,32 +121,4 @@ pub(super) fn cover(
 /// Grid coordinates of a place in the row-major grid.
 pub(super) fn node(place: usize, cols: usize) -> DVec2 {
     DVec2::new((place % cols) as f64, (place / cols) as f64)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Sym2;
-
-    #[test]
-    fn clusters_look_at_few_nodes_beyond_their_own() {
-        let tensor = |col: usize, row: usize| {
-            let speed = 1.0 + 0.5 * (0.05 * (col + 2 * row) as f64).sin();
-            Some(Sym2::new(speed, 0.0, 2.0 - speed))
-        };
-        let field = TensorField::from_fn(400, 400, tensor, &Control::default()).unwrap();
-        for (epsilon, most) in [(5.0, 16.0), (20.0, 5.0), (80.0, 4.0)] {
-            let mut clusters = Clusters { field: &field, reach: REACH, looked_at: 0 };
-            let mut held = 0;
-            for seed in (0..40).map(|i| [(i * 97) % 400, (i * 151) % 400]) {
-                let nodes = clusters.around(seed, epsilon, &Control::default()).unwrap();
-                // The window of the cluster before, and the distances in it, change little.
-                let alone = cluster(&field, seed, epsilon, &Control::default()).unwrap();
-                assert!(nodes.len().abs_diff(alone.len()) * 50 < alone.len(), "{seed:?}");
-                held += nodes.len();
-            }
-            let share = clusters.looked_at as f64 / held as f64;
-            assert!(share < most, "{epsilon}: {share}");
-        }
-    }
 }
