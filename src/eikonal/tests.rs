@@ -5,6 +5,7 @@ mod periodic;
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
+use rayon::prelude::*;
 
 use super::*;
 use crate::Sym2;
@@ -298,6 +299,21 @@ fn thread_count_changes_no_bit() {
         let map = run(threads);
         assert_eq!(map.values.tiles, one.values.tiles);
         assert_eq!(map.statistics(), one.statistics());
+    }
+}
+
+/// The threads of a pool help each other's solves, and none waits for one that is busy with its own.
+#[test]
+fn solves_side_by_side_are_as_alone() {
+    let start = |i: usize| DVec2::new(20.0 + 15.0 * i as f64, 90.5);
+    let f = field(200, 200, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
+    let alone: Vec<_> = (0..8).map(|i| solve(f.clone(), start(i)).values.tiles).collect();
+    for threads in [1, 2, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let together: Vec<_> = pool.install(|| {
+            (0..8).into_par_iter().map(|i| solve(f.clone(), start(i)).values.tiles).collect()
+        });
+        assert_eq!(together, alone);
     }
 }
 
