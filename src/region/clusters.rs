@@ -111,8 +111,6 @@ pub(super) fn cover(
         control.report("covering", done as f64 / order.len() as f64);
         let held = balls.around(coordinates(seed), epsilon, &quiet)?;
         held.for_each(|(place, _)| is_held[place] = true);
-        // Where the metric is too extreme to seed a node, its cluster is empty.
-        is_held[seed] = true;
         seeds.push(seed);
     }
     Ok(Cover { seeds, epsilon })
