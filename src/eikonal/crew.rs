@@ -2,7 +2,8 @@
 //!
 //! A round lasts 10 to 100 µs. Waking sleeping threads for each would cost as much as it gains, so the helpers, threads of the
 //! pool, stay awake for the whole solve, watching for the next round. The leader never waits for a helper that has not
-//! taken a job, so one that is busy elsewhere delays nobody. (Threads made for a solve were at times put on the leader's own core and
+//! taken a job, so one that is busy elsewhere delays no round; only the end of a solve that is led from outside the pool waits until
+//! its threads have looked. (Threads made for a solve were at times put on the leader's own core and
 //! stayed there for milliseconds: two threads then gained 1.3 to 1.6 instead of 1.65 to 1.75.)
 //!
 //! What one core has written costs another some 100 ns per cache line to read. So jobs come in order of place, and each thread
