@@ -10,9 +10,11 @@ use std::iter::once;
 use glam::DVec2;
 
 use super::field::{SIDE, TensorField};
+use super::queue::Job;
+use super::sides::neighbours;
 use super::source::{self, Seeds};
 use super::stop::is_final;
-use super::tiles::{self, Desk, End, Equation, Job, Shared, neighbours};
+use super::tiles::{self, Desk, End, Equation, Shared};
 use super::update::Rule;
 use super::{Cones, Solver, StartRegion, Stop, unsettled};
 use crate::{Control, Result};

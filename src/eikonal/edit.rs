@@ -9,8 +9,9 @@
 use rayon::prelude::*;
 
 use super::field::{AREA, TensorTile};
+use super::sides::neighbours;
 use super::source::{self, Seeds};
-use super::tiles::{self, Equation, News, Solution, Statistics, Values, neighbours};
+use super::tiles::{self, Equation, News, Solution, Statistics, Values};
 use super::update::UNREACHED;
 use super::{Cones, DistanceMap, Solver, Stop, TensorField};
 use crate::{Control, MetricField, Result, Sym2};

@@ -13,12 +13,12 @@ use rayon::prelude::*;
 use super::board::{Board, LimitsBoard};
 use super::cone::Cones;
 use super::crew;
-use super::field::{AREA, SIDE, TensorField, TensorTile, Tiling, wrap};
+use super::field::{AREA, SIDE, TensorField, TensorTile, Tiling};
+use super::queue::{Job, Queue};
+use super::sides::{ITSELF, NEIGHBOURS, SIDES, lines_beside, neighbour, neighbours, opposite};
 use super::source::Seeds;
 use super::stop::{self, Standing, Stop};
-use super::update::{
-    ALL, Bench, Block, Limits, Lines, ROUNDING, Rule, Tile, UNREACHED, choose, lanes, least,
-};
+use super::update::{Bench, Block, Limits, ROUNDING, Rule, Tile, UNREACHED, choose, lanes, least};
 use crate::{Control, Result};
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
@@ -104,27 +104,6 @@ impl Default for Outcome {
     }
 }
 
-/// Where news of a tile come from, as (tiles east, tiles south): its neighbours, and itself.
-const SIDES: [(isize, isize); 9] =
-    [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (0, 0)];
-pub(super) const NEIGHBOURS: [(isize, isize); 8] = {
-    let [neighbours @ .., _] = SIDES;
-    neighbours
-};
-pub(super) const ITSELF: usize = 8;
-
-/// The rows and the columns of a tile of a size next to the given sides. A corner is in the row.
-fn lines_beside(sides: u16, [width, height]: [usize; 2]) -> [Lines; 2] {
-    let line = |at: isize, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
-    (0..SIDES.len()).filter(|side| sides & 1 << side != 0).fold([0; 2], |[rows, cols], side| {
-        match SIDES[side] {
-            (0, 0) => [ALL, cols],
-            (dx, 0) => [rows, cols | line(dx, width)],
-            (_, dy) => [rows | line(dy, height), cols],
-        }
-    })
-}
-
 /// Sweeps of a tile before it goes back into the queue.
 const MAX_SWEEPS: u32 = 16;
 
@@ -137,131 +116,6 @@ const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 /// 37, 36, 34, 33 at ratio 400 on two.
 pub(super) const WINDOW_CELLS: f32 = 10.0;
 
-/// The tiles that wait, and what is known of each.
-#[derive(Debug)]
-pub(super) struct Queue {
-    waiting: Vec<u32>,
-    /// Least value that may still change the tile; infinite if it does not wait.
-    key: Vec<f32>,
-    /// The sides of the tile that have news, one bit each in the order of [`SIDES`], and which of
-    /// them has the least.
-    sides: Vec<u16>,
-    first: Vec<u8>,
-    /// How often the tile was solved.
-    activations: Vec<u32>,
-    /// Number of the round that last took the tile or one of its neighbours.
-    taken: Vec<u32>,
-}
-
-impl Queue {
-    pub(super) fn new(tiles: usize) -> Self {
-        Self {
-            waiting: Vec::new(),
-            key: vec![f32::INFINITY; tiles],
-            sides: vec![0; tiles],
-            first: vec![0; tiles],
-            activations: vec![0; tiles],
-            taken: vec![0; tiles],
-        }
-    }
-
-    /// Forgets all, where only the given tiles and those that wait were ever touched.
-    fn clear(&mut self, tiles: &[usize]) {
-        for tile in self.waiting.drain(..) {
-            self.key[tile as usize] = f32::INFINITY;
-        }
-        for &tile in tiles {
-            (self.activations[tile], self.taken[tile]) = (0, 0);
-        }
-    }
-
-    /// News of value `key` from the neighbour `side`.
-    pub(super) fn wake(&mut self, tile: usize, key: f32, side: usize) {
-        if self.key[tile] == f32::INFINITY {
-            self.waiting.push(tile as u32);
-            self.sides[tile] = 0;
-        }
-        self.sides[tile] |= 1 << side;
-        if key < self.key[tile] {
-            self.key[tile] = key;
-            self.first[tile] = side as u8;
-        }
-    }
-
-    pub(super) fn least_key(&self) -> f32 {
-        self.waiting.iter().map(|&t| self.key[t as usize]).fold(f32::INFINITY, f32::min)
-    }
-
-    /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first, and gives them, as the bits of
-    /// [`Job`]s, in order of place.
-    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u64>) {
-        // Keys are not negative, so that their bits are in order.
-        let ranked = |&tile: &u32| (self.key[tile as usize], tile);
-        let mut candidates: Vec<u64> = self
-            .waiting
-            .iter()
-            .map(ranked)
-            .filter(|&(key, _)| key <= limit)
-            .map(|(key, tile)| u64::from(key.to_bits()) << 32 | u64::from(tile))
-            .collect();
-        candidates.sort_unstable();
-        for candidate in candidates {
-            let tile = candidate as u32;
-            let i = tile as usize;
-            if self.taken[i] == round {
-                continue;
-            }
-            taken.push(Job { tile, sides: self.sides[i], first: self.first[i] }.to_bits());
-            self.key[i] = f32::INFINITY;
-            self.taken[i] = round;
-            for (_, n) in neighbours(tiling, i) {
-                self.taken[n] = round;
-            }
-        }
-        taken.sort_unstable();
-        let key = &self.key;
-        self.waiting.retain(|&t| key[t as usize] < f32::INFINITY);
-    }
-}
-
-/// A tile to be solved.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Job {
-    pub(super) tile: u32,
-    /// The sides that have news, and the one with the least, see [`Queue`].
-    sides: u16,
-    first: u8,
-}
-
-impl Job {
-    /// The tile in the upper half, so that bits are in its order.
-    fn to_bits(self) -> u64 {
-        u64::from(self.tile) << 32 | u64::from(self.sides) << 16 | u64::from(self.first)
-    }
-
-    pub(super) fn from_bits(bits: u64) -> Self {
-        Self { tile: (bits >> 32) as u32, sides: (bits >> 16) as u16, first: bits as u8 }
-    }
-}
-
-/// The tile `(dx, dy)` from another.
-pub(super) fn neighbour(tiling: &Tiling, tile: usize, dx: isize, dy: isize) -> Option<usize> {
-    let [across, down] = tiling.periodic;
-    let x = wrap((tile % tiling.across) as isize + dx, tiling.across, across)?;
-    let y = wrap((tile / tiling.across) as isize + dy, tiling.down, down)?;
-    Some(y * tiling.across + x)
-}
-
-/// The neighbours of a tile, each with its side.
-pub(super) fn neighbours(tiling: &Tiling, tile: usize) -> impl Iterator<Item = (usize, usize)> {
-    let &Tiling { across, down, periodic, .. } = tiling;
-    let (x, y) = ((tile % across) as isize, (tile / across) as isize);
-    NEIGHBOURS.into_iter().enumerate().filter_map(move |(side, (dx, dy))| {
-        let (x, y) = (wrap(x + dx, across, periodic[0])?, wrap(y + dy, down, periodic[1])?);
-        Some((side, y * across + x))
-    })
-}
-
 /// What the solvers of a round share.
 #[derive(Debug)]
 pub(super) struct Shared {
@@ -273,6 +127,8 @@ pub(super) struct Shared {
 #[derive(Debug)]
 pub(super) struct Desk {
     queue: Queue,
+    /// How often each tile was solved.
+    activations: Vec<u32>,
     pub(super) shared: Shared,
     /// How many nodes have a value from before.
     reached: usize,
@@ -283,9 +139,9 @@ pub(super) struct Desk {
 impl Desk {
     fn new(board: Board, limits: Vec<Limits>) -> Self {
         let slack = limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
-        let queue = Queue::new(limits.len());
         Self {
-            queue,
+            activations: vec![0; limits.len()],
+            queue: Queue::new(limits.len()),
             shared: Shared { board, limits: LimitsBoard::new(limits) },
             reached: 0,
             slack,
@@ -322,13 +178,16 @@ impl Desk {
 
     /// Whether the tile was solved.
     pub(super) fn is_solved(&self, tile: usize) -> bool {
-        self.queue.activations[tile] > 0
+        self.activations[tile] > 0
     }
 
     /// Forgets a solve of which only the given tiles were solved or beside ones that were. Their values stay.
     pub(super) fn clear(&mut self, tiles: &[usize]) {
         self.queue.clear(tiles);
-        tiles.iter().for_each(|&tile| self.shared.limits.forget(tile));
+        for &tile in tiles {
+            self.activations[tile] = 0;
+            self.shared.limits.forget(tile);
+        }
         (self.reached, self.slack) = (0, 0.0);
     }
 }
@@ -415,7 +274,7 @@ pub(super) fn relax(
     &Equation { field, cones, seeds, tolerance }: &Equation<'_>,
     rule: Rule,
     stop: &Stop,
-    Desk { queue, shared, reached, slack }: &mut Desk,
+    Desk { queue, activations, shared, reached, slack }: &mut Desk,
     mut open: impl FnMut(&[u64], &Shared),
     control: &Control,
 ) -> Result<End> {
@@ -438,11 +297,10 @@ pub(super) fn relax(
     let lead = |jobs: &mut Vec<u64>, outcomes: &[Outcome]| -> Result<()> {
         for (job, outcome) in jobs.drain(..).zip(outcomes) {
             let tile = Job::from_bits(job).tile as usize;
-            let activations = &mut queue.activations[tile];
-            *activations += 1;
-            settles &= *activations < most;
+            activations[tile] += 1;
+            settles &= activations[tile] < most;
             statistics.activations += 1;
-            statistics.tiles += usize::from(*activations == 1);
+            statistics.tiles += usize::from(activations[tile] == 1);
             statistics.sweeps += outcome.sweeps as usize;
             *slack = slack.max(outcome.slack);
             settle(&tiling, queue, tile, outcome);
@@ -458,7 +316,7 @@ pub(super) fn relax(
         let reached = *reached + statistics.tiles * AREA;
         let Shared { board, limits } = shared;
         let standing = Standing { field, board, limits, reached, slack: *slack, news };
-        if queue.waiting.is_empty() || standing.allows(stop) {
+        if queue.is_empty() || standing.allows(stop) {
             return Ok(());
         }
         statistics.rounds += 1;
@@ -513,11 +371,6 @@ fn wake_front(tiling: &Tiling, before: &Values, board: &Board, edited: &[f32], q
             queue.wake(tile, key, ITSELF);
         }
     }
-}
-
-/// The side on which the neighbour sees this tile.
-pub(super) fn opposite(side: usize) -> usize {
-    (side + 4) % 8
 }
 
 /// Wakes the neighbours that a tile can improve.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::field::{AREA, SIDE, Tiling};
-use super::super::tiles::neighbours;
+use super::super::sides::neighbours;
 use super::super::update::{UNREACHED, least};
 use super::FirstOrder;
 use super::feet::{Feet, Input, Surroundings};

@@ -1,7 +1,7 @@
 //! Tiles side by side with the nodes around them.
 
 use super::super::field::{AREA, SIDE, Tiling};
-use super::super::tiles::neighbour;
+use super::super::sides::neighbour;
 use super::super::update::{RING, lanes};
 
 /// A value of each node of a row of a tile.
