@@ -12,8 +12,7 @@
 //! twelve two threads need 1.4 µs more than half of what one needs; with a lock around the jobs and one around each outcome it was 1.9.
 
 use std::cell::Cell;
-use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::{hint, thread};
 
 use crate::Result;
@@ -26,31 +25,27 @@ const ALONE: usize = 16;
 /// Glances at the next round before a helper lets other threads run.
 const GLANCES: u32 = 1000;
 
-/// What the crew shares. Aligned so that what is written at different times lies in different cache lines.
+/// What the crew shares. Aligned so that what is written at different times, or by different members, lies in different cache lines.
 #[derive(Debug)]
-struct Deck<O> {
+struct Deck<const N: usize> {
     round: Apart<AtomicU64>,
-    /// How many jobs of the round are done.
-    done: Apart<AtomicUsize>,
     jobs: Vec<AtomicU64>,
-    /// The last round in which somebody took each job.
-    taken: Vec<AtomicU32>,
-    /// What each member brought.
-    trays: Vec<Apart<Tray<O>>>,
+    /// `N` numbers for each job.
+    outcomes: Vec<AtomicU32>,
+    /// How many jobs of each member's part are taken, and how many each member has done.
+    taken: Vec<Apart<AtomicU64>>,
+    done: Vec<Apart<AtomicU64>>,
 }
-
-/// Outcomes with the places of their jobs.
-type Tray<O> = Mutex<Vec<(usize, O)>>;
 
 #[derive(Debug, Default)]
 #[repr(align(128))]
 struct Apart<T>(T);
 
-/// A round as a number: its own, counted from 1, and that of its jobs.
+/// The number of a round, counted from 1, and that of its jobs, or of some of them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Round {
     number: u32,
-    jobs: u32,
+    count: u32,
 }
 
 impl Round {
@@ -58,11 +53,11 @@ impl Round {
     const OVER: u64 = 0;
 
     fn to_bits(self) -> u64 {
-        u64::from(self.number) << 32 | u64::from(self.jobs)
+        u64::from(self.number) << 32 | u64::from(self.count)
     }
 
     fn from_bits(bits: u64) -> Self {
-        Self { number: (bits >> 32) as u32, jobs: bits as u32 }
+        Self { number: (bits >> 32) as u32, count: bits as u32 }
     }
 }
 
@@ -71,10 +66,10 @@ impl Round {
 ///
 /// # Errors
 /// What `lead` returns.
-pub(super) fn run<O: Default + Send, B: Default>(
+pub(super) fn run<const N: usize, B: Default>(
     most: usize,
-    mut lead: impl FnMut(&mut Vec<u64>, &[O]) -> Result<()>,
-    work: impl Fn(&mut B, u64) -> O + Sync,
+    mut lead: impl FnMut(&mut Vec<u64>, &[[u32; N]]) -> Result<()>,
+    work: impl Fn(&mut B, u64) -> [u32; N] + Sync,
 ) -> Result<()> {
     let members = rayon::current_num_threads();
     let mut bench = B::default();
@@ -94,25 +89,22 @@ pub(super) fn run<O: Default + Send, B: Default>(
     }
     let deck = Deck {
         round: Apart::default(),
-        done: Apart::default(),
-        jobs: (0..most).map(|_| AtomicU64::new(0)).collect(),
-        taken: (0..most).map(|_| AtomicU32::new(0)).collect(),
-        trays: (0..members).map(|_| Apart::default()).collect(),
+        jobs: bytemuck::zeroed_vec(most),
+        outcomes: bytemuck::zeroed_vec(most * N),
+        taken: (0..members).map(|_| Apart::default()).collect(),
+        done: (0..members).map(|_| Apart::default()).collect(),
     };
-    deck.round.0.store(Round { number: 1, jobs: 0 }.to_bits(), Ordering::Relaxed);
+    deck.round.0.store(Round { number: 1, count: 0 }.to_bits(), Ordering::Relaxed);
     rayon::in_place_scope(|scope| {
         let _over = OnDrop(|| deck.round.0.store(Round::OVER, Ordering::Release));
         let (deck, work) = (&deck, &work);
         for helper in 1..members {
             scope.spawn(move |_| deck.help(helper, work));
         }
-        let mut mine = Vec::new();
         for number in 2.. {
             let round = deck.begin(number, &jobs);
-            deck.take_jobs(0, round, &mut mine, |job| work(&mut bench, job));
-            while deck.done.0.load(Ordering::Acquire) < jobs.len() {
-                hint::spin_loop();
-            }
+            deck.take_jobs(0, round, |job| work(&mut bench, job));
+            deck.wait(round);
             deck.collect(jobs.len(), &mut outcomes);
             lead(&mut jobs, &outcomes)?;
             if jobs.is_empty() {
@@ -123,65 +115,80 @@ pub(super) fn run<O: Default + Send, B: Default>(
     })
 }
 
-impl<O: Default> Deck<O> {
+impl<const N: usize> Deck<N> {
     fn begin(&self, number: u32, jobs: &[u64]) -> Round {
         for (place, &job) in self.jobs.iter().zip(jobs) {
             place.store(job, Ordering::Relaxed);
         }
-        self.done.0.store(0, Ordering::Relaxed);
-        let round = Round { number, jobs: jobs.len() as u32 };
+        let round = Round { number, count: jobs.len() as u32 };
         self.round.0.store(round.to_bits(), Ordering::Release);
         round
     }
 
-    /// Does jobs until all of the round are taken. `mine` is empty before and after.
-    fn take_jobs(
-        &self,
-        member: usize,
-        round: Round,
-        mine: &mut Vec<(usize, O)>,
-        mut work: impl FnMut(u64) -> O,
-    ) {
+    /// Does jobs until all of the round are taken: those of the member's own part, then what is left of the others'.
+    fn take_jobs(&self, member: usize, round: Round, mut work: impl FnMut(u64) -> [u32; N]) {
         let claimed = Cell::new(0);
-        // Last of all, so that what was brought can be collected.
         let _done = OnDrop(|| {
             if claimed.get() > 0 {
-                self.done.0.fetch_add(claimed.get(), Ordering::Release);
+                let done = Round { count: claimed.get(), ..round };
+                self.done[member].0.store(done.to_bits(), Ordering::Release);
             }
         });
-        for place in order(member, self.trays.len(), round.jobs as usize) {
-            if self.claims(place, round.number) {
+        let members = self.taken.len();
+        for part in (member..members).chain(0..member) {
+            while let Some(place) = self.claim(part, round) {
                 claimed.set(claimed.get() + 1);
-                mine.push((place, work(self.jobs[place].load(Ordering::Relaxed))));
+                let outcome = work(self.jobs[place].load(Ordering::Relaxed));
+                for (word, bits) in self.outcomes[place * N..].iter().zip(outcome) {
+                    word.store(bits, Ordering::Relaxed);
+                }
             }
-        }
-        if !mine.is_empty() {
-            self.trays[member].0.lock().unwrap_or_else(PoisonError::into_inner).append(mine);
         }
     }
 
-    /// Takes a job, if nobody has. One who comes late, in a later round, finds all jobs of his taken.
-    fn claims(&self, place: usize, round: u32) -> bool {
-        let taken = &self.taken[place];
-        let last = taken.load(Ordering::Relaxed);
-        last < round
-            && taken.compare_exchange(last, round, Ordering::Relaxed, Ordering::Relaxed).is_ok()
+    /// Takes the next job of a part, if any is left. One who comes late, in a later round, finds all jobs of his taken.
+    ///
+    /// A member takes those of every other part backwards, so that two meet in the middle.
+    fn claim(&self, part: usize, round: Round) -> Option<usize> {
+        let (members, jobs) = (self.taken.len(), round.count as usize);
+        let (first, end) = (part * jobs / members, (part + 1) * jobs / members);
+        let taken_of = |bits: u64| {
+            let last = Round::from_bits(bits);
+            if last.number == round.number { last.count } else { 0 }
+        };
+        let next = |bits: u64| {
+            let is_late = Round::from_bits(bits).number > round.number;
+            let count = taken_of(bits) + 1;
+            (!is_late && first + count as usize <= end).then(|| Round { count, ..round }.to_bits())
+        };
+        let taken = &self.taken[part].0;
+        let bits = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next).ok()?;
+        let nth = taken_of(bits) as usize;
+        Some(if part % 2 == 0 { first + nth } else { end - 1 - nth })
+    }
+
+    /// Until all jobs of the round are done.
+    fn wait(&self, round: Round) {
+        let done = |member: &Apart<AtomicU64>| {
+            let done = Round::from_bits(member.0.load(Ordering::Acquire));
+            if done.number == round.number { done.count } else { 0 }
+        };
+        while self.done.iter().map(done).sum::<u32>() < round.count {
+            hint::spin_loop();
+        }
     }
 
     /// The outcomes of a round in the order of its jobs.
-    fn collect(&self, jobs: usize, outcomes: &mut Vec<O>) {
-        outcomes.resize_with(jobs, O::default);
-        for tray in &self.trays {
-            let mut tray = tray.0.lock().unwrap_or_else(PoisonError::into_inner);
-            for (place, outcome) in tray.drain(..) {
-                outcomes[place] = outcome;
-            }
-        }
+    fn collect(&self, jobs: usize, outcomes: &mut Vec<[u32; N]>) {
+        outcomes.clear();
+        outcomes.extend((0..jobs).map(|place| {
+            std::array::from_fn(|k| self.outcomes[place * N + k].load(Ordering::Relaxed))
+        }));
     }
 
     /// Joins every round until all is over.
-    fn help<B: Default>(&self, member: usize, work: &impl Fn(&mut B, u64) -> O) {
-        let (mut bench, mut mine) = (B::default(), Vec::new());
+    fn help<B: Default>(&self, member: usize, work: &impl Fn(&mut B, u64) -> [u32; N]) {
+        let mut bench = B::default();
         let mut seen = Round::OVER;
         let mut glances = 0;
         loop {
@@ -190,7 +197,7 @@ impl<O: Default> Deck<O> {
                 round if round != seen => {
                     (seen, glances) = (round, 0);
                     let round = Round::from_bits(round);
-                    self.take_jobs(member, round, &mut mine, |job| work(&mut bench, job));
+                    self.take_jobs(member, round, |job| work(&mut bench, job));
                 }
                 _ if glances < GLANCES => {
                     glances += 1;
@@ -200,17 +207,6 @@ impl<O: Default> Deck<O> {
             }
         }
     }
-}
-
-/// The order in which a member of the crew looks for jobs: the jobs in a circle, from its own part on; every other
-/// member backwards from the end of its part, so that two meet in the middle.
-fn order(member: usize, crew: usize, jobs: usize) -> impl Iterator<Item = usize> {
-    let backwards = member % 2 == 1;
-    let first = (member + usize::from(backwards)) * jobs / crew.max(member + 1);
-    (0..jobs).map(move |step| match backwards {
-        false => (first + step) % jobs,
-        true => (first + jobs - 1 - step) % jobs,
-    })
 }
 
 /// Also when a job panics, so that nobody waits for it for ever.

@@ -98,9 +98,22 @@ struct Outcome {
     sweeps: u32,
 }
 
-impl Default for Outcome {
-    fn default() -> Self {
-        Self { wakes: [f32::INFINITY; 8], unsettled: f32::INFINITY, slack: 0.0, sweeps: 0 }
+impl Outcome {
+    const NOTHING: Self =
+        Self { wakes: [f32::INFINITY; 8], unsettled: f32::INFINITY, slack: 0.0, sweeps: 0 };
+
+    fn to_bits(self) -> [u32; 11] {
+        let [e, se, s, sw, w, nw, n, ne] = self.wakes.map(f32::to_bits);
+        [e, se, s, sw, w, nw, n, ne, self.unsettled.to_bits(), self.slack.to_bits(), self.sweeps]
+    }
+
+    fn from_bits([wakes @ .., unsettled, slack, sweeps]: [u32; 11]) -> Self {
+        Self {
+            wakes: wakes.map(f32::from_bits),
+            unsettled: f32::from_bits(unsettled),
+            slack: f32::from_bits(slack),
+            sweeps,
+        }
     }
 }
 
@@ -292,18 +305,19 @@ pub(super) fn relax(
         let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
-        solve_tile(bench, &tiling, &input, rule, shared, job)
+        solve_tile(bench, &tiling, &input, rule, shared, job).to_bits()
     };
-    let lead = |jobs: &mut Vec<u64>, outcomes: &[Outcome]| -> Result<()> {
+    let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 11]]| -> Result<()> {
         for (job, outcome) in jobs.drain(..).zip(outcomes) {
             let tile = Job::from_bits(job).tile as usize;
+            let outcome = Outcome::from_bits(*outcome);
             activations[tile] += 1;
             settles &= activations[tile] < most;
             statistics.activations += 1;
             statistics.tiles += usize::from(activations[tile] == 1);
             statistics.sweeps += outcome.sweeps as usize;
             *slack = slack.max(outcome.slack);
-            settle(&tiling, queue, tile, outcome);
+            settle(&tiling, queue, tile, &outcome);
         }
         control.check()?;
         if !settles {
@@ -405,7 +419,7 @@ fn solve_tile(
     let mut owed = lines_beside(job.sides, size);
     let mut changes = [0; 2];
     let mut changed = false;
-    let mut outcome = Outcome::default();
+    let mut outcome = Outcome::NOTHING;
     while outcome.sweeps < MAX_SWEEPS && (owed, changes) != ([0; 2], [0; 2]) {
         let side = usize::from(by_columns);
         let dirty = owed[side] | changes[side];

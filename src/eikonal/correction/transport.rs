@@ -50,25 +50,29 @@ pub(super) fn carry(
     let work = |_: &mut (), job: u64| {
         let tile = Job::from_bits(job).tile as usize;
         match patch.feet(tile) {
-            Some((feet, _)) => carry_tile(&tiling, feet, &e, tile, tolerance),
-            None => Outcome { settled: true, changed: 0 },
+            Some((feet, _)) => {
+                let o = carry_tile(&tiling, feet, &e, tile, tolerance);
+                [u32::from(o.settled), o.changed.into()]
+            }
+            None => [1, 0],
         }
     };
-    let lead = |jobs: &mut Vec<u64>, outcomes: &[Outcome]| {
+    let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 2]]| {
         control.check()?;
         for (job, outcome) in jobs.drain(..).zip(outcomes) {
             let tile = Job::from_bits(job).tile as usize;
+            let &[settled, changed] = outcome;
             activations[tile] += 1;
             let mut wake = |tile: usize| {
                 if activations[tile] < MOST_ACTIVATIONS {
                     queue.wake(tile, keys[tile], ITSELF);
                 }
             };
-            if !outcome.settled {
+            if settled == 0 {
                 wake(tile);
             }
             for (side, n) in neighbours(&tiling, tile) {
-                if outcome.changed & 1 << side == 0 {
+                if changed & 1 << side == 0 {
                     continue;
                 }
                 match patch.feet(n) {
