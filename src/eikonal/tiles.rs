@@ -334,7 +334,7 @@ pub(super) fn relax(
             return Ok(());
         }
         statistics.rounds += 1;
-        let limit = (news + window).min(standing.last_news(stop));
+        let limit = queue.horizon(window).min(standing.last_news(stop));
         queue.take(&tiling, limit, statistics.rounds as u32, jobs);
         open(jobs, shared);
         Ok(())
