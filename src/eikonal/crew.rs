@@ -6,10 +6,11 @@
 //! its threads have looked. (Threads made for a solve were at times put on the leader's own core and
 //! stayed there for milliseconds: two threads then gained 1.3 to 1.6 instead of 1.65 to 1.75.)
 //!
-//! What one core has written costs another some 100 ns per cache line to read. So jobs come in order of place, and each thread
-//! begins at a place of its own: from round to round it gets jobs near those it had. And so little is shared: the
-//! number of the round, the jobs as plain numbers side by side, who took which, and a tray of outcomes for each thread. For a round of
-//! twelve two threads need 1.4 µs more than half of what one needs; with a lock around the jobs and one around each outcome it was 1.9.
+//! What one core has written costs another some 100 ns per cache line to read. So jobs come in order of place, and each member
+//! of the crew begins at a place of its own: from round to round it gets jobs near those it had (dealt out in turn, they took 10 %
+//! longer). And so little is shared: jobs and outcomes as plain numbers side by side, and for each member how many jobs of its part are
+//! taken and how many it has done. For a round of twelve two threads need 1.4 µs more than half of what one needs; with a flag
+//! for each job and outcomes behind a lock it was 1.7.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -25,15 +26,16 @@ const ALONE: usize = 16;
 /// Glances at the next round before a helper lets other threads run.
 const GLANCES: u32 = 1000;
 
-/// What the crew shares. Aligned so that what is written at different times, or by different members, lies in different cache lines.
+/// What the crew shares. What is written at different times, or by different members, lies in different cache lines.
 #[derive(Debug)]
 struct Deck<const N: usize> {
     round: Apart<AtomicU64>,
     jobs: Vec<AtomicU64>,
     /// `N` numbers for each job.
     outcomes: Vec<AtomicU32>,
-    /// How many jobs of each member's part are taken, and how many each member has done.
+    /// The last round in which jobs of each member's part were taken, and how many were.
     taken: Vec<Apart<AtomicU64>>,
+    /// The last round in which each member did jobs, and how many.
     done: Vec<Apart<AtomicU64>>,
 }
 
@@ -41,7 +43,7 @@ struct Deck<const N: usize> {
 #[repr(align(128))]
 struct Apart<T>(T);
 
-/// The number of a round, counted from 1, and that of its jobs, or of some of them.
+/// The number of a round, counted from 1, and a number of its jobs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Round {
     number: u32,
@@ -51,6 +53,12 @@ struct Round {
 impl Round {
     /// After the last round.
     const OVER: u64 = 0;
+
+    /// The count of jobs in `bits`, if they are of this round.
+    fn count_in(self, bits: u64) -> u32 {
+        let Self { number, count } = Self::from_bits(bits);
+        if number == self.number { count } else { 0 }
+    }
 
     fn to_bits(self) -> u64 {
         u64::from(self.number) << 32 | u64::from(self.count)
@@ -62,7 +70,7 @@ impl Round {
 }
 
 /// Alternates `lead`, which is given the jobs of a round and their outcomes and puts those of the next in their place, with `work`
-/// on these by all threads, until there are none. A round has at most `most` jobs. `work` has a bench to itself.
+/// on these by all threads, until there are none. A round has at most `most` jobs. A job comes to `N` numbers. `work` has a bench to itself.
 ///
 /// # Errors
 /// What `lead` returns.
@@ -104,7 +112,9 @@ pub(super) fn run<const N: usize, B: Default>(
         for number in 2.. {
             let round = deck.begin(number, &jobs);
             deck.take_jobs(0, round, |job| work(&mut bench, job));
-            deck.wait(round);
+            while !deck.is_done(round) {
+                hint::spin_loop();
+            }
             deck.collect(jobs.len(), &mut outcomes);
             lead(&mut jobs, &outcomes)?;
             if jobs.is_empty() {
@@ -128,6 +138,7 @@ impl<const N: usize> Deck<N> {
     /// Does jobs until all of the round are taken: those of the member's own part, then what is left of the others'.
     fn take_jobs(&self, member: usize, round: Round, mut work: impl FnMut(u64) -> [u32; N]) {
         let claimed = Cell::new(0);
+        // Last of all, so that the outcomes can be collected.
         let _done = OnDrop(|| {
             if claimed.get() > 0 {
                 let done = Round { count: claimed.get(), ..round };
@@ -148,34 +159,25 @@ impl<const N: usize> Deck<N> {
 
     /// Takes the next job of a part, if any is left. One who comes late, in a later round, finds all jobs of his taken.
     ///
-    /// A member takes those of every other part backwards, so that two meet in the middle.
+    /// Every other part is taken backwards, so that two members meet in the middle.
     fn claim(&self, part: usize, round: Round) -> Option<usize> {
         let (members, jobs) = (self.taken.len(), round.count as usize);
         let (first, end) = (part * jobs / members, (part + 1) * jobs / members);
-        let taken_of = |bits: u64| {
-            let last = Round::from_bits(bits);
-            if last.number == round.number { last.count } else { 0 }
-        };
-        let next = |bits: u64| {
-            let is_late = Round::from_bits(bits).number > round.number;
-            let count = taken_of(bits) + 1;
-            (!is_late && first + count as usize <= end).then(|| Round { count, ..round }.to_bits())
+        let one_more = |bits: u64| {
+            let count = round.count_in(bits) + 1;
+            let is_left =
+                Round::from_bits(bits).number <= round.number && count as usize <= end - first;
+            is_left.then(|| Round { count, ..round }.to_bits())
         };
         let taken = &self.taken[part].0;
-        let bits = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, next).ok()?;
-        let nth = taken_of(bits) as usize;
-        Some(if part % 2 == 0 { first + nth } else { end - 1 - nth })
+        let before = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_more).ok()?;
+        let taken = round.count_in(before) as usize;
+        Some(if part.is_multiple_of(2) { first + taken } else { end - 1 - taken })
     }
 
-    /// Until all jobs of the round are done.
-    fn wait(&self, round: Round) {
-        let done = |member: &Apart<AtomicU64>| {
-            let done = Round::from_bits(member.0.load(Ordering::Acquire));
-            if done.number == round.number { done.count } else { 0 }
-        };
-        while self.done.iter().map(done).sum::<u32>() < round.count {
-            hint::spin_loop();
-        }
+    fn is_done(&self, round: Round) -> bool {
+        let done = |member: &Apart<AtomicU64>| round.count_in(member.0.load(Ordering::Acquire));
+        self.done.iter().map(done).sum::<u32>() == round.count
     }
 
     /// The outcomes of a round in the order of its jobs.

@@ -170,15 +170,16 @@ impl Desk {
     /// Wakes a tile that holds start values, and the neighbours that some lie beside.
     pub(super) fn wake(&mut self, tiling: &Tiling, tile: usize, seeds: &Seeds) {
         let [cols, rows] = tiling.size(tile);
-        let beside = |along: isize, at: usize, count: usize| match along {
-            0 => true,
-            1 => at + 1 == count,
-            _ => at == 0,
+        let line = |along: isize, count: usize| match along {
+            0 => 0..count,
+            1 => count - 1..count,
+            _ => 0..1,
         };
         let least = |side: usize| {
             let (dx, dy) = SIDES[side];
-            let place = |&i: &usize| beside(dx, i % SIDE, cols) && beside(dy, i / SIDE, rows);
-            (0..AREA).filter(place).map(|i| seeds[i]).fold(f32::INFINITY, f32::min)
+            let (cols, rows) = (line(dx, cols), line(dy, rows));
+            let places = rows.flat_map(|row| cols.clone().map(move |col| row * SIDE + col));
+            places.map(|i| seeds[i]).fold(f32::INFINITY, f32::min)
         };
         self.queue.wake(tile, least(ITSELF), ITSELF);
         for (side, n) in neighbours(tiling, tile) {
@@ -186,6 +187,13 @@ impl Desk {
             if key < f32::INFINITY {
                 self.queue.wake(n, key, opposite(side));
             }
+        }
+    }
+
+    /// Wakes all tiles that hold start values or lie beside some.
+    fn wake_start(&mut self, tiling: &Tiling, seeds: &[Option<Box<Seeds>>]) {
+        for (tile, seeds) in seeds.iter().enumerate() {
+            seeds.iter().for_each(|seeds| self.wake(tiling, tile, seeds));
         }
     }
 
@@ -251,7 +259,7 @@ pub(super) fn solve(
     let tiling = field.tiling;
     let mut desk = Desk::new(Board::new(values, f32::INFINITY), limits);
     match news {
-        News::All => wake_start(field, equation.seeds, &mut desk.queue),
+        News::All => desk.wake_start(&tiling, equation.seeds),
         News::Since { before, edited } => {
             wake_front(&tiling, before, &desk.shared.board, edited, &mut desk.queue);
             desk.reached = before.reached();
@@ -308,9 +316,9 @@ pub(super) fn relax(
         solve_tile(bench, &tiling, &input, rule, shared, job).to_bits()
     };
     let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 11]]| -> Result<()> {
-        for (job, outcome) in jobs.drain(..).zip(outcomes) {
+        for (job, &outcome) in jobs.drain(..).zip(outcomes) {
             let tile = Job::from_bits(job).tile as usize;
-            let outcome = Outcome::from_bits(*outcome);
+            let outcome = Outcome::from_bits(outcome);
             activations[tile] += 1;
             settles &= activations[tile] < most;
             statistics.activations += 1;
@@ -341,14 +349,6 @@ pub(super) fn relax(
     };
     crew::run(tiling.tiles(), lead, work)?;
     Ok(End { settles, news, statistics })
-}
-
-/// Wakes every tile that holds a start value, and its neighbours, on all sides.
-fn wake_start(field: &TensorField, seeds: &[Option<Box<Seeds>>], queue: &mut Queue) {
-    let least = |seeds: &Option<Box<Seeds>>| {
-        seeds.iter().flat_map(|seeds| seeds.iter()).copied().fold(f32::INFINITY, f32::min)
-    };
-    wake_around(&field.tiling, seeds.iter().map(least), queue);
 }
 
 /// Wakes every tile whose key is finite, and its neighbours on the sides to it.

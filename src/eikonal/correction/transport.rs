@@ -21,11 +21,22 @@ use crate::{Control, Result};
 const MOST_SWEEPS: usize = 40;
 const MOST_ACTIVATIONS: u32 = 40;
 
-#[derive(Default)]
+/// What carrying the correction through a tile brought.
+#[derive(Clone, Copy)]
 struct Outcome {
     settled: bool,
     /// The neighbours beside which something changed, one bit each as in [`RING`](super::super::update::RING).
     changed: u8,
+}
+
+impl Outcome {
+    fn to_bits(self) -> [u32; 2] {
+        [self.settled.into(), self.changed.into()]
+    }
+
+    fn from_bits([settled, changed]: [u32; 2]) -> Self {
+        Self { settled: settled != 0, changed: changed as u8 }
+    }
 }
 
 /// Solves `e = (1−θ) e(a) + θ e(b) + ρ` in a patch, tiles in the given `order`, that of their least distance; also the tiles
@@ -49,30 +60,28 @@ pub(super) fn carry(
     let mut queue = Queue::new(tiles);
     let work = |_: &mut (), job: u64| {
         let tile = Job::from_bits(job).tile as usize;
-        match patch.feet(tile) {
-            Some((feet, _)) => {
-                let o = carry_tile(&tiling, feet, &e, tile, tolerance);
-                [u32::from(o.settled), o.changed.into()]
-            }
-            None => [1, 0],
-        }
+        let outcome = match patch.feet(tile) {
+            Some((feet, _)) => carry_tile(&tiling, feet, &e, tile, tolerance),
+            None => Outcome { settled: true, changed: 0 },
+        };
+        outcome.to_bits()
     };
     let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 2]]| {
         control.check()?;
-        for (job, outcome) in jobs.drain(..).zip(outcomes) {
+        for (job, &outcome) in jobs.drain(..).zip(outcomes) {
             let tile = Job::from_bits(job).tile as usize;
-            let &[settled, changed] = outcome;
+            let outcome = Outcome::from_bits(outcome);
             activations[tile] += 1;
             let mut wake = |tile: usize| {
                 if activations[tile] < MOST_ACTIVATIONS {
                     queue.wake(tile, keys[tile], ITSELF);
                 }
             };
-            if settled == 0 {
+            if !outcome.settled {
                 wake(tile);
             }
             for (side, n) in neighbours(&tiling, tile) {
-                if changed & 1 << side == 0 {
+                if outcome.changed & 1 << side == 0 {
                     continue;
                 }
                 match patch.feet(n) {
@@ -107,19 +116,17 @@ fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f
     let mut descending = feet.descending;
     let mut sweeps = 0;
     let mut dirty = ALL;
-    let mut outcome = Outcome::default();
     while dirty != 0 && sweeps < MOST_SWEEPS {
         dirty = sweep(&mut block, feet, tolerance, descending, dirty);
         descending = !descending;
         sweeps += 1;
     }
-    outcome.settled = dirty == 0;
     if feet.by_columns {
         mirror_block(&mut block);
     }
-    outcome.changed = changed_sides(tiling, e, tile, &block, tolerance);
+    let changed = changed_sides(tiling, e, tile, &block, tolerance);
     e.store(tile, &block);
-    outcome
+    Outcome { settled: dirty == 0, changed }
 }
 
 /// The sides, as in [`Outcome`], on which the block differs from the board by more than `tolerance`.
