@@ -47,7 +47,8 @@ use crate::{Control, Error, GridFrame, MetricField, Result};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
     /// Iteration stops where a node would change by less than this share of its shortest step. Default 1e-3,
-    /// which moves no value by more than 3e-5 of the largest; tightening it is nearly free, and of no use.
+    /// which moves no value by more than 1e-4 of the largest, at 1001² by 4e-5, less than the scheme's own error; with a tenth of
+    /// it a solve takes up to 12 % longer.
     pub tolerance: f32,
     /// How accurate.
     pub accuracy: Accuracy,
