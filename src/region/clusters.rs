@@ -103,10 +103,8 @@ pub(super) fn cover(
             continue;
         }
         if seeds.len() == MOST {
-            return Err(Error::usage(format!(
-                "clusters of radius {epsilon} are too small: {MOST} of them do not cover the surface; choose a larger \
-                 epsilon"
-            )));
+            let held = is_held.iter().filter(|&&held| held).count();
+            return Err(too_small(epsilon, held, order.len()));
         }
         control.report("covering", done as f64 / order.len() as f64);
         let held = balls.around(coordinates(seed), epsilon, &quiet)?;
@@ -116,7 +114,39 @@ pub(super) fn cover(
     Ok(Cover { seeds, epsilon })
 }
 
+/// Refuses clusters of which [`MOST`] hold only so many of the open nodes.
+fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
+    // A cluster holds as many nodes as the square of its radius, the last ones fewer: to two digits.
+    let larger = 1.5 * epsilon * (open as f64 / held as f64).sqrt();
+    let scale = 10f64.powi(1 - larger.log10().floor() as i32);
+    let percent = 100.0 * held as f64 / open as f64;
+    let advice = match held > 2 * MOST {
+        true => format!("one of {} may do", (larger * scale).ceil() / scale),
+        false => "most hold nothing but their seed".to_owned(),
+    };
+    Error::usage(format!(
+        "{MOST} clusters with an epsilon of {epsilon:?} hold only {percent:.1} % of the surface; choose a larger one; {advice}"
+    ))
+}
+
 /// Grid coordinates of a place in the row-major grid.
 pub(super) fn node(place: usize, cols: usize) -> DVec2 {
     DVec2::new((place % cols) as f64, (place / cols) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sym2;
+
+    #[test]
+    fn clusters_too_small_to_cover_are_refused() {
+        let control = Control::default();
+        let tensor = |_: usize, _: usize| Some(Sym2::new(1.0, 0.0, 1.0));
+        let field = TensorField::from_fn(300, 300, tensor, &control).unwrap();
+        let refusal = cover(&field, &vec![0.0; 300 * 300], Some(0.0), &control).unwrap_err();
+        assert!(refusal.to_string().contains("72.8 %"), "{refusal}");
+        let refusal = too_small(0.2, 2 * MOST + 1, 8 * MOST);
+        assert!(refusal.to_string().ends_with("one of 0.6 may do"), "{refusal}");
+    }
 }
