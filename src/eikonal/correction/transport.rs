@@ -202,13 +202,13 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance
     for i in 0..SIDE {
         let triangle = Triangle::from_bits(bits[i]);
         let moves = bits[i] & Triangle::NONE == 0;
-        let b = triangle.diagonal([0.0, se[i], 0.0, sw[i], 0.0, nw[i], 0.0, ne[i]]);
-        let across = choose(triangle.negative, n[i], s[i]);
+        let [b, _] = triangle.diagonals([0.0, se[i], 0.0, sw[i], 0.0, nw[i], 0.0, ne[i]]);
+        let across = triangle.negative.choose(n[i], s[i]);
         let own = 1.0 - theta[i];
-        let a = choose(triangle.along_y, own * across, 0.0);
+        let a = triangle.along_y.choose(own * across, 0.0);
         beside[i] = choose(moves, a + theta[i] * b + rho[i], old[i]);
-        let along = choose(moves & !triangle.along_y, own, 0.0);
-        from_west[i] = choose(triangle.negative, along, 0.0);
+        let along = triangle.along_y.choose(0.0, choose(moves, own, 0.0));
+        from_west[i] = triangle.negative.choose(along, 0.0);
         from_east[i] = along - from_west[i];
     }
     let line = &mut block[row + 1];
