@@ -125,8 +125,9 @@ impl Feet {
         self.rho[places.clone()].copy_from_slice(&line.rho);
         let mut packed = [0; SIDE];
         for i in 0..SIDE {
-            let share = (line.theta[i] * SHARES + 0.5) as i32;
-            packed[i] = ((share << Triangle::BITS) as u32 | line.triangle[i]) as u16;
+            // The last bits of a number beyond 2²³ count ones: a conversion would saturate, which is not done lane by lane.
+            let share = (line.theta[i] * SHARES + 8_388_608.0).to_bits() & 0xfff;
+            packed[i] = (share << Triangle::BITS | line.triangle[i]) as u16;
         }
         self.packed[places].copy_from_slice(&packed);
     }
