@@ -8,7 +8,7 @@ use super::super::field::{AREA, SIDE};
 use super::super::mirror::mirror;
 use super::super::update::{How, LaneLimits, RING, Tile, UNREACHED, choose, lanes, prepare_shifts};
 use super::FirstOrder;
-use super::functional::{ConeAt, Foot, Quadratic};
+use super::functional::{ConeAt, Foot};
 use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
 use super::triangle::Triangle;
 
@@ -272,8 +272,7 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
     let dets = lanes(&tile.tensors.det, row * SIDE);
     let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
-    // In several loops: as one, it is not vectorised for AVX2.
-    let (mut bits, mut slopes, mut on) = ([0; SIDE], [0.0; SIDE], [0.0; SIDE]);
+    let (mut slopes, mut on) = ([0.0; SIDE], [0.0; SIDE]);
     for i in 0..SIDE {
         let mut shifted = around_node(&ring, i);
         if IN_CONE {
@@ -282,55 +281,45 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
                 on[i] = choose(shifts[k][i] < 0.0, 1.0, on[i]);
             }
         }
-        (bits[i], slopes[i]) = Triangle::best(shifted, [xx[i], xy[i], yy[i]], det[i]);
+        (line.triangle[i], slopes[i]) = Triangle::best(shifted, [xx[i], xy[i], yy[i]], det[i]);
     }
-    let mut rises = [[0.0; SIDE]; 4];
     for i in 0..SIDE {
-        let triangle = Triangle::from_bits(bits[i]);
-        let ring = around_node(&ring, i);
+        let bits = line.triangle[i];
+        let triangle = Triangle::from_bits(bits);
+        let (ring, here) = (around_node(&ring, i), [xx[i], xy[i], yy[i]]);
         let far = |[e, s, w, n]: &[Lanes; 4]| triangle.side(e[i], s[i], w[i], n[i]);
-        rises[0][i] = triangle.axis(ring);
-        [rises[1][i], rises[2][i]] = triangle.diagonals(ring);
-        rises[3][i] = triangle.backwards().choose(far(&ahead), far(&behind));
-    }
-    let mut quadratics = [[[0.0; SIDE]; 3]; 2];
-    for i in 0..SIDE {
-        let triangle = Triangle::from_bits(bits[i]);
         let (xx, xy, yy) =
             (around_node(&metrics[0], i), around_node(&metrics[1], i), around_node(&metrics[2], i));
-        let a = triangle.mirror([triangle.axis(xx), triangle.axis(xy), triangle.axis(yy)]);
+        let axis = [triangle.axis(xx), triangle.axis(xy), triangle.axis(yy)];
         let diagonal = |ring: [f32; 8]| triangle.diagonals(ring)[0];
-        let b = triangle.mirror([diagonal(xx), diagonal(xy), diagonal(yy)]);
-        (quadratics[0][0][i], quadratics[0][1][i], quadratics[0][2][i]) = (a.0, a.1, a.2);
-        (quadratics[1][0][i], quadratics[1][1][i], quadratics[1][2][i]) = (b.0, b.1, b.2);
-    }
-    let [at_a, at_b] = &quadratics;
-    for i in 0..SIDE {
-        let triangle = Triangle::from_bits(bits[i]);
+        let [beside, opposite] = triangle.diagonals(ring);
         let foot = Foot {
-            rise: [rises[0][i], rises[1][i], rises[2][i], rises[3][i]],
+            rise: [
+                triangle.axis(ring),
+                beside,
+                opposite,
+                triangle.backwards().choose(far(&ahead), far(&behind)),
+            ],
             slope: slopes[i],
-            here: triangle.mirror([xx[i], xy[i], yy[i]]),
-            at_a: Quadratic(at_a[0][i], at_a[1][i], at_a[2][i]),
-            at_b: Quadratic(at_b[0][i], at_b[1][i], at_b[2][i]),
+            here: triangle.mirror(here),
+            at_a: triangle.mirror(axis),
+            at_b: triangle.mirror([diagonal(xx), diagonal(xy), diagonal(yy)]),
             cone: ConeAt::new(
                 on[i],
                 triangle.mirror(m0),
                 triangle.mirror_place([origin[0] + i as f32, origin[1]]),
             ),
             known: match before {
-                Some(line) => choose(line.triangle[i] == bits[i], line.theta[i], -1.0),
+                Some(line) => choose(line.triangle[i] == bits, line.theta[i], -1.0),
                 None => -1.0,
             },
         };
-        (line.theta[i], line.rho[i]) = foot.minimise::<IN_CONE, NEWTON_STEPS>();
-    }
-    for i in 0..SIDE {
+        let (theta, rho) = foot.minimise::<IN_CONE, NEWTON_STEPS>();
         // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
-        line.triangle[i] = if fixed { Triangle::NONE } else { bits[i] };
-        line.theta[i] = choose(fixed, 0.0, line.theta[i]);
-        line.rho[i] = choose(fixed, 0.0, line.rho[i]);
+        line.triangle[i] = if fixed { Triangle::NONE } else { bits };
+        line.theta[i] = choose(fixed, 0.0, theta);
+        line.rho[i] = choose(fixed, 0.0, rho);
     }
     line
 }
