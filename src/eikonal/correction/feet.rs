@@ -6,11 +6,11 @@ use multiversion::multiversion;
 
 use super::super::field::{AREA, SIDE};
 use super::super::mirror::mirror;
-use super::super::update::{How, LaneLimits, RING, Tile, UNREACHED, choose, lanes, prepare_shifts};
+use super::super::update::{How, LaneLimits, RING, Tile, UNREACHED, lanes, prepare_shifts};
 use super::FirstOrder;
 use super::functional::{ConeAt, Foot};
 use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
-use super::triangle::Triangle;
+use super::triangle::{Triangle, choose};
 
 /// Where the values of a tile's nodes come from, and what the functional of second order adds there; by rows or, where
 /// `by_columns`, by columns.

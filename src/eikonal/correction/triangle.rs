@@ -1,6 +1,6 @@
 //! The eight triangles around a node, mirrored onto one.
 
-use super::super::update::{choose, greatest, least, pass};
+use super::super::update::{greatest, least, pass};
 use super::functional::{Quadratic, inverse_root};
 
 /// Yes or no, as the bits of a lane: all set or none.
@@ -37,6 +37,12 @@ impl Mask {
     pub(super) fn is_yes(self) -> bool {
         self.0 != 0
     }
+}
+
+/// As [`Mask::choose`].
+#[inline(always)]
+pub(super) fn choose(yes: bool, a: f32, b: f32) -> f32 {
+    Mask(0u32.wrapping_sub(u32::from(yes))).choose(a, b)
 }
 
 /// The triangle between an axis neighbour `a` and a diagonal neighbour `b` of a node.
