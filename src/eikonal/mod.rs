@@ -4,7 +4,7 @@
 //! (`update.rs`) and iterates it to a standstill tile by tile in order of distance (`tiles.rs`). First order
 //! in the spacing, also near the start, where the cone of a point is taken out (`cone.rs`); second order by deferred
 //! correction if asked for ([`Accuracy`], `correction/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
-//! ns of one core and 16 bytes per node, at high accuracy 90 to 140 ns and 24 bytes. [`mod@reference`] is the slow
+//! ns of one core and 16 bytes per node, at high accuracy 80 to 150 ns and 24 bytes. [`mod@reference`] is the slow
 //! judge; `docs/solver.md` has the measurements.
 
 mod ball;
@@ -60,7 +60,8 @@ pub enum Accuracy {
     /// First order in the spacing.
     #[default]
     Fast,
-    /// Second order, by deferred correction, with an estimate of the error at each node; takes 2.3 to 3.3 times as long.
+    /// Second order, by deferred correction, with an estimate of the error at each node; takes 2.1 to 3.1 times as long, with
+    /// AVX2 but not AVX-512 up to 3.7.
     High,
 }
 
