@@ -116,16 +116,18 @@ pub(super) fn cover(
 
 /// Refuses clusters of which [`MOST`] hold only so many of the open nodes.
 fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
-    // A cluster holds as many nodes as the square of its radius, the last ones fewer: to two digits.
-    let larger = 1.5 * epsilon * (open as f64 / held as f64).sqrt();
-    let scale = 10f64.powi(1 - larger.log10().floor() as i32);
-    let percent = 100.0 * held as f64 / open as f64;
-    let advice = match held > 2 * MOST {
-        true => format!("one of {} may do", (larger * scale).ceil() / scale),
-        false => "most hold nothing but their seed".to_owned(),
+    let share = held as f64 / open as f64;
+    let advice = if held > 2 * MOST {
+        // A cluster holds as many nodes as the square of its radius, the last ones fewer: to two digits.
+        let larger = 1.5 * epsilon / share.sqrt();
+        let scale = 10f64.powi(1 - larger.log10().floor() as i32);
+        format!("one of {} may do", (larger * scale).ceil() / scale)
+    } else {
+        "most hold nothing but their seed".to_owned()
     };
     Error::usage(format!(
-        "{MOST} clusters with an epsilon of {epsilon:?} hold only {percent:.1} % of the surface; choose a larger one; {advice}"
+        "{MOST} clusters with an epsilon of {epsilon:?} hold only {:.1} % of the surface; choose a larger one; {advice}",
+        100.0 * share
     ))
 }
 
