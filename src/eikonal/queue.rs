@@ -45,7 +45,7 @@ impl Queue {
         self.tiles.is_empty()
     }
 
-    /// Forgets all, where only the given tiles, those beside them and those that wait were ever touched.
+    /// Forgets all, where only the given tiles and those that wait were taken, woken or lie beside one that was.
     pub(super) fn clear(&mut self, tiles: &[usize]) {
         for tile in self.tiles.drain(..) {
             self.entries[tile as usize] = Entry::NEW;

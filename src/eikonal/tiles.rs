@@ -126,7 +126,7 @@ const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 
 /// Width of the window of keys that one round may take, in mean cells. Wider gives more tiles to a round but solves
 /// some too early. At 1001² 8, 10, 16, 24 take 30, 28, 28, 31 ms on a plane, 36, 39, 46, 54 at random speeds (one thread) and
-/// 37, 36, 34, 33 at ratio 400 on two.
+/// 37, 36, 34, 33 at ratio 400 on two, before rounds took at least a share of the tiles that wait ([`Queue::horizon`]).
 pub(super) const WINDOW_CELLS: f32 = 10.0;
 
 /// What the solvers of a round share.

@@ -272,6 +272,7 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
     let dets = lanes(&tile.tensors.det, row * SIDE);
     let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
+    // The triangles first: in one loop with the rest 2 % slower.
     let (mut slopes, mut on) = ([0.0; SIDE], [0.0; SIDE]);
     for i in 0..SIDE {
         let mut shifted = around_node(&ring, i);

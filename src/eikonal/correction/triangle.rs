@@ -39,7 +39,7 @@ impl Mask {
     }
 }
 
-/// As [`Mask::choose`].
+/// As [`Mask::choose`]: unlike the one of `update.rs` never a branch.
 #[inline(always)]
 pub(super) fn choose(yes: bool, a: f32, b: f32) -> f32 {
     Mask(0u32.wrapping_sub(u32::from(yes))).choose(a, b)
