@@ -11,7 +11,7 @@ use criterion::{
 use glam::DVec2;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use ridgeway::eikonal::TensorField;
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Stop};
 
 use problems::{ACCURACIES, Problem, solver};

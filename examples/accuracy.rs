@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 use ridgeway::route::trace;
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
     Control, Crs, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground, HeightSurface,
     Metric, MetricField, Modifiers, Smoothing, Solver, Stop, Sym2, Terrain,

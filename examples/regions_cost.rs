@@ -8,7 +8,7 @@ use glam::DVec2;
 use rayon::ThreadPoolBuilder;
 use ridgeway::eikonal::TensorField;
 use ridgeway::region::{Neighbours, SegmentOptions, Segmentation, signatures};
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Result, Solver, Stop};
 
 const STAGES: [&str; 5] = ["metric", "solve", "ranks", "cover, labels", "signatures"];

@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// A flag that asks running work to stop. Clones share the flag.
 #[derive(Clone, Debug, Default)]

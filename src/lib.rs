@@ -32,7 +32,7 @@
 //! # }
 //! ```
 //!
-//! * [`terrain`]: [`Terrain::open`] reads GeoTIFF, ESRI ASCII grids and SRTM tiles; [`terrain::synthetic`] makes terrains
+//! * [`terrain`]: [`Terrain::open`] reads GeoTIFF, ESRI ASCII grids and SRTM tiles; [`synthetic`] makes terrains
 //!   with known answers. Heights are metres, voids `NaN`, row 0 is north.
 //! * [`surface`]: [`HeightSurface::fit`] makes the tensor-product B-spline `z(x, y)`; a [`HeightJet`] is its value and
 //!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape. Surfaces that are no terrain are
@@ -72,18 +72,21 @@ pub mod eikonal;
 mod error;
 pub mod export;
 mod grid;
+pub mod linalg;
 pub mod metric;
 pub mod region;
 pub mod render;
 pub mod route;
 pub mod surface;
+pub mod synthetic;
 pub mod terrain;
 
 pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion, Stop};
 pub use error::{Error, Result};
 pub use grid::{GridFrame, Ground};
-pub use metric::{Delta, Metric, MetricField, Modifiers, SurfaceMetric, Sym2};
+pub use linalg::Sym2;
+pub use metric::{Delta, Metric, MetricField, Modifiers, SurfaceMetric};
 pub use route::{Comparison, Route};
 pub use surface::{
     Degree, FitOptions, HeightJet, HeightSurface, Knots, NurbsCurve, NurbsGrid, NurbsSurface,

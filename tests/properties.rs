@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec2;
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind, cylinder_distance, sphere_distance};
+use ridgeway::synthetic::{Synthetic, SyntheticKind, cylinder_distance, sphere_distance};
 use ridgeway::{
     Comparison, Control, Crs, Delta, DistanceMap, FitOptions, GridFrame, Ground, HeightSurface,
     Metric, Modifiers, Route, Smoothing, Solver, Stop, Terrain, route::trace,

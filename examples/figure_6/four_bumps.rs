@@ -3,7 +3,7 @@
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
 use ridgeway::region::{SegmentOptions, Segmentation, gaussian_ranks};
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
     Control, Crs, Delta, Error, FitOptions, HeightSurface, Metric, Modifiers, Smoothing, Terrain,
 };

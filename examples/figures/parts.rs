@@ -5,7 +5,7 @@ use ridgeway::metric::{Difference, Metric};
 use ridgeway::region::{
     Neighbours, SegmentOptions, Segmentation, Signature, gaussian_ranks, signatures,
 };
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
     Control, Crs, Delta, FitOptions, HeightSurface, NurbsCurve, NurbsGrid, NurbsSurface,
     ParametricSurface, Result, Smoothing, Solver, StartRegion, Stop,

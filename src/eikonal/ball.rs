@@ -17,7 +17,8 @@ use super::stop::is_final;
 use super::tiles::{self, Desk, End, Equation, Shared};
 use super::update::Rule;
 use super::{Cones, Solver, StartRegion, Stop, unsettled};
-use crate::{Control, Result};
+use crate::control::Control;
+use crate::error::Result;
 
 /// Finds one ball after the other.
 #[derive(Debug)]
@@ -147,8 +148,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::Sym2;
     use crate::eikonal::field::AREA;
+    use crate::linalg::Sym2;
 
     fn field(
         cols: usize,
@@ -294,7 +295,10 @@ mod tests {
         let mut balls = Balls::new(&field);
         let control = Control::default();
         control.cancel.cancel();
-        assert!(matches!(balls.around([50, 40], 20.0, &control), Err(crate::Error::Cancelled)));
+        assert!(matches!(
+            balls.around([50, 40], 20.0, &control),
+            Err(crate::error::Error::Cancelled)
+        ));
         assert_eq!(ball(&mut balls, [50, 47], 9.0), ball(&mut Balls::new(&field), [50, 47], 9.0));
     }
 

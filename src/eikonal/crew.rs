@@ -16,7 +16,7 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::{hint, thread};
 
-use crate::Result;
+use crate::error::Result;
 
 /// Fewest jobs of a round that are worth calling helpers for.
 const MIN_PARALLEL: usize = 4;

@@ -14,7 +14,10 @@ use super::source::{self, Seeds};
 use super::tiles::{self, Equation, News, Solution, Statistics, Values};
 use super::update::UNREACHED;
 use super::{Cones, DistanceMap, Solver, Stop, TensorField};
-use crate::{Control, MetricField, Result, Sym2};
+use crate::control::Control;
+use crate::error::Result;
+use crate::linalg::Sym2;
+use crate::metric::MetricField;
 
 impl Solver {
     /// The distances from the starts of `map` under another metric, of which only what the difference can have moved is solved again.

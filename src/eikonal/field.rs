@@ -6,9 +6,12 @@ use glam::DVec2;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::linalg::Sym2;
+use crate::metric::MetricField;
 use crate::metric::SpeedBlock;
 use crate::surface::BLOCK;
-use crate::{Control, Error, MetricField, Result, Sym2};
 
 /// Side of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
 /// needs more activations, the longer more sweeps; design measurements at ratio 1 to 400).
@@ -503,8 +506,11 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
-    use crate::{Crs, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers, Terrain};
+    use crate::grid::{GridFrame, Ground};
+    use crate::metric::{Metric, Modifiers};
+    use crate::surface::{FitOptions, HeightSurface};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::{Crs, Terrain};
 
     /// The stored tensors of a metric against those at single points; the largest relative difference.
     fn difference(metric: &MetricField<'_>) -> f64 {

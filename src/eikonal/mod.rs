@@ -41,7 +41,10 @@ pub use self::stop::Stop;
 pub use self::tiles::Statistics;
 use self::tiles::{Equation, News, Solution, Values};
 use self::update::{Limits, RING, UNREACHED, segment};
-use crate::{Control, Error, GridFrame, MetricField, Result};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::grid::GridFrame;
+use crate::metric::MetricField;
 
 /// Solves the eikonal equation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -135,7 +135,9 @@ mod tests {
 
     use super::super::update::RING;
     use super::*;
-    use crate::{Control, Solver, Stop, Sym2};
+    use crate::control::Control;
+    use crate::eikonal::{Solver, Stop};
+    use crate::linalg::Sym2;
 
     #[test]
     fn origins_are_the_ends_nearest_to_the_feet() {

@@ -8,7 +8,8 @@ use super::source::StartRegion;
 use super::tiles::Values;
 use super::update::{Limits, RING, ceiling};
 use super::{DistanceMap, Statistics, best_foot, source};
-use crate::{Control, Error, Result};
+use crate::control::Control;
+use crate::error::{Error, Result};
 
 /// Sweeps after which a solve is given up.
 const MOST_SWEEPS: usize = 2000;

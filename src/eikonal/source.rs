@@ -7,7 +7,8 @@ use glam::DVec2;
 use super::cone::Cone;
 use super::field::{AREA, TensorField, Tiling};
 use super::update::{UNREACHED, segment};
-use crate::{Error, Result, Sym2};
+use crate::error::{Error, Result};
+use crate::linalg::Sym2;
 
 /// Values that a tile's nodes have from the start, infinite where none.
 pub(super) type Seeds = [f32; AREA];

@@ -6,7 +6,7 @@ use super::board::{Board, LimitsBoard};
 use super::field::{AREA, TensorField};
 use super::tiles::Values;
 use super::update::{Limits, UNREACHED};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// When to stop. Whatever the rule, what a map reports is final: the same as without it, but for the tolerance. All else is
 /// unreached.

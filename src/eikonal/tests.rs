@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use rayon::prelude::*;
 
 use super::*;
-use crate::Sym2;
+use crate::linalg::Sym2;
 
 mod edit;
 

@@ -19,7 +19,8 @@ use super::sides::{ITSELF, NEIGHBOURS, SIDES, lines_beside, neighbour, neighbour
 use super::source::Seeds;
 use super::stop::{self, Standing, Stop};
 use super::update::{Bench, Block, Limits, ROUNDING, Rule, Tile, UNREACHED, choose, lanes, least};
-use crate::{Control, Result};
+use crate::control::Control;
+use crate::error::Result;
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
 #[derive(Clone, Debug)]

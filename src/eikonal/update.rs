@@ -26,7 +26,7 @@ use super::cone::Cone;
 use super::field::{SIDE, TensorTile};
 use super::mirror::mirror_block;
 use super::source::Seeds;
-use crate::Sym2;
+use crate::linalg::Sym2;
 
 /// Value of a node that no front has reached. Far above any distance, and its square still a finite `f32`.
 pub(crate) const UNREACHED: f32 = 1e18;

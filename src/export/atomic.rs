@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tempfile::NamedTempFile;
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// Where [`write_file`] lets its caller write; it can seek too.
 type Output = BufWriter<NamedTempFile>;

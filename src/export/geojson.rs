@@ -6,9 +6,11 @@ use serde_json::{Value, json};
 
 use super::isolines::Isoline;
 use super::round;
+use crate::error::Result;
+use crate::grid::GridFrame;
 use crate::region::Polygon;
+use crate::route::Route;
 use crate::terrain::Crs;
-use crate::{GridFrame, Result, Route};
 
 /// A feature per `(name, route)` whose properties are `name` and all of the route's summary.
 /// `provenance`, a JSON object, becomes the collection's member of that name: what is needed to make
@@ -241,8 +243,9 @@ fn cut_at_antimeridian(line: &[DVec3]) -> Vec<Vec<DVec3>> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::error::Error;
+    use crate::grid::Ground;
     use crate::route::Summary;
-    use crate::{Error, Ground};
 
     pub(in crate::export) fn route() -> Route {
         Route {

@@ -17,8 +17,9 @@ use tiff::tags::{
 };
 use tiff::{TiffError, TiffResult};
 
+use crate::grid::GridFrame;
+use crate::terrain::Crs;
 use crate::terrain::GeoKeys;
-use crate::{Crs, GridFrame};
 
 /// Side of a tile in pixels, GDAL's default.
 const TILE: usize = 256;
@@ -360,7 +361,7 @@ mod tests {
     use tiff::decoder::{Decoder, DecodingResult};
 
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     fn frame(cols: usize, rows: usize) -> GridFrame {
         let origin = DVec2::new(400_015.0, 4_599_985.0);

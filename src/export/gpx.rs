@@ -4,8 +4,9 @@ use ::gpx::{Gpx, GpxVersion, Track, TrackSegment, Waypoint};
 use glam::DVec2;
 
 use super::{digits, round};
+use crate::error::{Error, Result};
+use crate::route::Route;
 use crate::terrain::Crs;
-use crate::{Error, Result, Route};
 
 /// A GPX document with one track per `(name, route)`, heights in metres.
 ///

@@ -8,7 +8,8 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use crate::{Error, GridFrame, Result};
+use crate::error::{Error, Result};
+use crate::grid::GridFrame;
 
 /// The lines on which a field has one value.
 #[derive(Clone, Debug, PartialEq)]
@@ -195,7 +196,7 @@ fn cell_segments(corner: [f64; 4], level: f64, mut segment: impl FnMut(usize, us
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     fn sampled(cols: usize, rows: usize, f: impl Fn(f64, f64) -> f64) -> (GridFrame, Vec<f32>) {
         let frame =

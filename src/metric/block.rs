@@ -2,7 +2,8 @@
 
 use multiversion::multiversion;
 
-use super::{Speed, Sym2, averse_to_climb, curvature};
+use super::{Speed, averse_to_climb, curvature};
+use crate::linalg::Sym2;
 use crate::surface::{BLOCK, JetBlock, Lanes};
 
 /// Speed tensors at the nodes of a block in ground axes, row by row: `D` and its determinant side by side. A
@@ -85,8 +86,11 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
-    use crate::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers};
+    use crate::control::Control;
+    use crate::metric::{Metric, Modifiers};
+    use crate::surface::{FitOptions, HeightSurface};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::Crs;
 
     #[test]
     fn wide_registers_change_no_bit() {

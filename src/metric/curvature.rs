@@ -1,8 +1,8 @@
 //! The curvature tensor CT of the paper, equation (4).
 
-use super::Sym2;
+use crate::linalg::Sym2;
 use crate::surface::Forms;
-use crate::{HeightJet, SurfaceJet};
+use crate::surface::{HeightJet, SurfaceJet};
 
 /// `G⁻¹`, the speed tensor of the geodesic distance, and its determinant.
 #[inline(always)]

@@ -25,8 +25,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{Delta, Speed, Sym2, curvature};
-use crate::{Control, ParametricSurface, Result, SurfaceJet};
+use super::{Delta, Speed, curvature};
+use crate::control::Control;
+use crate::error::Result;
+use crate::linalg::Sym2;
+use crate::surface::{ParametricSurface, SurfaceJet};
 
 /// The difference curvature tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -361,10 +364,12 @@ mod tests {
 
     use super::DifferenceForm::{Literal, Rate};
     use super::*;
-    use crate::{
-        CancelToken, Crs, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers,
-        Smoothing, Terrain,
-    };
+    use crate::control::CancelToken;
+    use crate::error::Error;
+    use crate::grid::{GridFrame, Ground};
+    use crate::metric::{Metric, Modifiers};
+    use crate::surface::{FitOptions, HeightSurface, Smoothing};
+    use crate::terrain::{Crs, Terrain};
 
     /// The surface of a formula, whose parameters are `origin` at node (0, 0) and change by `steps` per column and per row.
     struct Formula<F: Fn(DVec2) -> SurfaceJet + Sync> {

@@ -19,7 +19,6 @@ mod block;
 mod curvature;
 mod difference;
 mod space;
-mod sym2;
 
 use std::sync::Arc;
 
@@ -30,9 +29,11 @@ pub(crate) use self::block::SpeedBlock;
 pub(crate) use self::curvature::of_surface;
 pub use self::difference::{Change, Difference, DifferenceForm};
 pub use self::space::SurfaceMetric;
-pub use self::sym2::Sym2;
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::linalg::Sym2;
 use crate::surface::BLOCK;
-use crate::{Control, Error, HeightJet, HeightSurface, ParametricSurface, Result};
+use crate::surface::{HeightJet, HeightSurface, ParametricSurface};
 
 /// What bends by no more than this, as curvature times extent, is a plane. A plane of 4000² cells of 30 m with heights in `f32` is fitted,
 /// by the defaults, with 5e-4 of rounding.

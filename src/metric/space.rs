@@ -4,8 +4,11 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::{Metric, Speed, check_tensors, curvature, length_along};
+use crate::control::Control;
 use crate::eikonal::TensorField;
-use crate::{Control, ParametricSurface, Result, SurfaceJet, Sym2};
+use crate::error::Result;
+use crate::linalg::Sym2;
+use crate::surface::{ParametricSurface, SurfaceJet};
 
 /// A metric bound to a [`ParametricSurface`]: the speed tensor `D` in grid coordinates (column, row), everywhere.
 ///
@@ -174,8 +177,11 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
-    use crate::{Crs, Delta, FitOptions, HeightSurface, Modifiers, Solver, Stop, Terrain};
+    use crate::eikonal::{Solver, Stop};
+    use crate::metric::{Delta, Modifiers};
+    use crate::surface::{FitOptions, HeightSurface};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::{Crs, Terrain};
 
     fn surfaces() -> impl Iterator<Item = HeightSurface> {
         [SyntheticKind::Fractal, SyntheticKind::Sphere].into_iter().map(|kind| {

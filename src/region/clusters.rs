@@ -3,9 +3,12 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
+use crate::control::Control;
 use crate::eikonal::{Balls, TensorField};
+use crate::error::{Error, Result};
+use crate::metric::MetricField;
 use crate::metric::SurfaceMetric;
-use crate::{Control, Error, MetricField, ParametricSurface, Result};
+use crate::surface::ParametricSurface;
 
 /// Most clusters of a cover: beyond this `ε` is surely a mistake.
 const MOST: usize = 1 << 16;
@@ -139,7 +142,7 @@ pub(super) fn node(place: usize, cols: usize) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Sym2;
+    use crate::linalg::Sym2;
 
     #[test]
     fn clusters_too_small_to_cover_are_refused() {

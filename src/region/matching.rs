@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Signature;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// Two regions that were matched.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -1,7 +1,9 @@
 //! Joining of neighbours that are alike.
 
 use super::{Level, Neighbours, Segmentation, signatures};
-use crate::{Control, Error, ParametricSurface, Result};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::surface::ParametricSurface;
 
 impl Segmentation {
     /// Joins neighbours on the last level that have one parent and whose signatures differ by at most `tolerance`, see
@@ -100,8 +102,8 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     use super::*;
-    use crate::SurfaceJet;
     use crate::region::Region;
+    use crate::surface::SurfaceJet;
 
     /// Flat in the west, waves in the east.
     struct Half;

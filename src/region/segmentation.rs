@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use super::clusters::{cover, node};
+use crate::control::Control;
 use crate::eikonal::TensorField;
-use crate::{Control, Error, Result, Solver, StartRegion, Stop};
+use crate::eikonal::{Solver, StartRegion, Stop};
+use crate::error::{Error, Result};
 
 /// Steps to the neighbours of a node, as (columns, rows).
 const RING: [(isize, isize); 8] =
@@ -234,7 +236,7 @@ mod tests {
     use rayon::ThreadPoolBuilder;
 
     use super::*;
-    use crate::Sym2;
+    use crate::linalg::Sym2;
 
     /// Speed 1 at nodes where the picture has a letter, closed at dots.
     fn plane(picture: &str) -> TensorField {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Level;
-use crate::{ParametricSurface, SurfaceJet};
+use crate::surface::{ParametricSurface, SurfaceJet};
 
 /// Measures of a region. Means are over its area on the surface, so that they do not depend on the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -92,9 +92,11 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
+    use crate::control::Control;
     use crate::region::Region;
-    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
-    use crate::{Control, Crs, FitOptions, HeightSurface, Smoothing};
+    use crate::surface::{FitOptions, HeightSurface, Smoothing};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::Crs;
 
     #[test]
     fn a_cylinder_has_the_curvature_and_area_of_a_cylinder() {

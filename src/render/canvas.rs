@@ -7,7 +7,7 @@ use tiny_skia::{
 };
 
 use super::text;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// An opaque colour: red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

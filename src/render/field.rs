@@ -7,8 +7,10 @@ use super::canvas::{self, Rgb};
 use super::relief::VOID;
 use super::sheet::{Item, SIDE, Sheet};
 use super::text::number;
+use crate::control::Control;
+use crate::error::{Error, Result};
 use crate::export::round_step;
-use crate::{Control, Error, GridFrame, Result};
+use crate::grid::GridFrame;
 
 /// Colours along the bar.
 const SHADES: usize = 256;
@@ -170,7 +172,7 @@ fn ticks(low: f64, high: f64) -> Vec<(f64, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     #[test]
     fn colours_run_from_end_to_end() {

@@ -8,8 +8,10 @@ use super::regions::RegionLayer;
 use super::relief::Relief;
 use super::sheet::{Item, SIDE, Sheet};
 use super::text;
+use crate::control::Control;
+use crate::error::{Error, Result};
 use crate::export::Isoline;
-use crate::{Control, Error, GridFrame, Result};
+use crate::grid::GridFrame;
 
 /// Every so many isolines one is thick and labelled.
 const MAJOR: usize = 5;
@@ -260,7 +262,7 @@ fn draw_labels(sheet: &mut Sheet, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     fn frame(cols: usize, rows: usize) -> GridFrame {
         GridFrame::new(cols, rows, DVec2::ZERO, DVec2::splat(30.0), Ground::METRES).unwrap()

@@ -5,7 +5,7 @@ use tiny_skia::Pixmap;
 
 use super::canvas::{self, Canvas, Rgb};
 use super::text;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// Pixels of the picture's side. Lengths below are in pixels of it.
 const SIDE: u32 = 1200;

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, Vec4};
 use rayon::prelude::*;
 
 use super::canvas::Rgb;
-use crate::GridFrame;
+use crate::grid::GridFrame;
 
 /// Tint from the lowest to the highest ground. Pale and little saturated, so that lines stand out.
 const TINT: [Rgb; 5] = [
@@ -160,7 +160,7 @@ fn shaded(colour: Rgb, brightness: f64) -> Rgb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     fn relief(cols: usize, rows: usize, side: usize, f: impl Fn(f64, f64) -> f64) -> Relief {
         let frame =

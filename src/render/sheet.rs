@@ -7,8 +7,10 @@ use tiny_skia::Pixmap;
 use super::canvas::{Canvas, Rgb};
 use super::relief::VOID;
 use super::text;
+use crate::control::Control;
+use crate::error::{Error, Result};
 use crate::export::round_step;
-use crate::{Control, Error, GridFrame, Result};
+use crate::grid::GridFrame;
 
 /// Pixels of the map's longer side unless told otherwise.
 pub(super) const SIDE: u32 = 1600;

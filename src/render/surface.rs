@@ -8,7 +8,8 @@ use super::canvas::{self, Canvas, Rgb};
 use super::regions::draw_numbers;
 use super::sheet::{SIDE, SIDES};
 use super::text;
-use crate::{Error, ParametricSurface, Result};
+use crate::error::{Error, Result};
+use crate::surface::ParametricSurface;
 
 /// Share of the light that is everywhere.
 const AMBIENT: f64 = 0.4;
@@ -362,7 +363,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{NurbsCurve, NurbsSurface};
+    use crate::surface::{NurbsCurve, NurbsSurface};
 
     #[test]
     fn the_near_side_is_seen() {

@@ -3,7 +3,10 @@
 use glam::DVec2;
 
 use super::{Route, trace};
-use crate::{Control, DistanceMap, MetricField, Result, Solver, StartRegion, Stop};
+use crate::control::Control;
+use crate::eikonal::{DistanceMap, Solver, StartRegion, Stop};
+use crate::error::Result;
+use crate::metric::MetricField;
 
 /// The routes of several metrics between the same places, and what each costs under each.
 #[derive(Clone, Debug)]

@@ -8,7 +8,7 @@
 
 use glam::DVec2;
 
-use crate::DistanceMap;
+use crate::eikonal::DistanceMap;
 
 /// Step of the midpoint rule in cells. A half or a quarter, and fourth order, give the same lines.
 const STEP: f64 = 0.5;
@@ -96,8 +96,10 @@ fn descend_to_node(distance: &DistanceMap, at: DVec2) -> Option<(DVec2, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::Control;
     use crate::eikonal::TensorField;
-    use crate::{Control, Solver, StartRegion, Stop, Sym2};
+    use crate::eikonal::{Solver, StartRegion, Stop};
+    use crate::linalg::Sym2;
 
     fn solve(
         n: usize,

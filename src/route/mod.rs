@@ -15,8 +15,11 @@ use glam::{DVec2, DVec3};
 pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
 pub use self::space::{SurfaceRoute, trace_on};
+use crate::eikonal::DistanceMap;
 use crate::eikonal::{TensorField, sees};
-use crate::{DistanceMap, Error, MetricField, Result, Sym2};
+use crate::error::{Error, Result};
+use crate::linalg::Sym2;
+use crate::metric::MetricField;
 
 /// A route over a surface, from the start region to a goal.
 #[derive(Clone, Debug)]
@@ -98,7 +101,11 @@ impl Route {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain};
+    use crate::control::Control;
+    use crate::eikonal::{Solver, Stop};
+    use crate::metric::{Metric, Modifiers};
+    use crate::surface::{FitOptions, HeightSurface};
+    use crate::terrain::Terrain;
 
     #[test]
     fn polishing_shortens_routes_on_real_ground() {

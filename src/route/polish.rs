@@ -21,7 +21,7 @@
 
 use glam::DVec2;
 
-use crate::Sym2;
+use crate::linalg::Sym2;
 use crate::metric::length_along;
 
 /// Longest segment in cells. The curvature tensor changes within a cell: on rough ground segments of one cell shorten routes
@@ -368,8 +368,9 @@ mod tests {
 
     use super::super::descent;
     use super::*;
+    use crate::control::Control;
+    use crate::eikonal::{DistanceMap, Solver, Stop};
     use crate::eikonal::{TensorField, sees};
-    use crate::{Control, DistanceMap, Solver, Stop};
 
     const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
 

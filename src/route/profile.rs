@@ -4,7 +4,8 @@ use glam::DVec2;
 use serde::Serialize;
 
 use super::Route;
-use crate::{HeightJet, HeightSurface, MetricField};
+use crate::metric::MetricField;
+use crate::surface::{HeightJet, HeightSurface};
 
 /// The numbers of a route. Lengths and heights in metres, grades in percent: rise per plan length.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,8 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::shortest;
+use crate::eikonal::DistanceMap;
+use crate::error::{Error, Result};
+use crate::metric::SurfaceMetric;
 use crate::metric::length_along;
-use crate::{DistanceMap, Error, Result, SurfaceMetric};
 
 /// A route over a [`ParametricSurface`](crate::ParametricSurface), from the start region to a goal.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use multiversion::multiversion;
 
 use super::HeightJet;
-use super::block::{BLOCK, JetBlock};
+use super::bspline::block::{BLOCK, JetBlock};
 
 /// Curvatures of a surface at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]

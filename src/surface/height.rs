@@ -5,13 +5,16 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::block::{BLOCK, JetBlock};
+use super::bspline::block::{BLOCK, JetBlock};
+use super::bspline::fit::Fit;
+use super::bspline::knots::{Plan, cross_validate, fewest_knots, mean_cell};
+use super::bspline::residuals::{Residuals, residuals};
+use super::bspline::voids::fit_finite;
 use super::curvature::sum_of_squared_curvatures;
-use super::fit::Fit;
-use super::plan::{Plan, cross_validate, fewest_knots, mean_cell};
-use super::residuals::{Residuals, residuals};
-use super::voids::fit_finite;
-use crate::{Control, Error, GridFrame, Result, Terrain};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::grid::GridFrame;
+use crate::terrain::Terrain;
 
 /// Degree of the B-spline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -289,7 +292,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     const DEGREES: [Degree; 2] = [Degree::Cubic, Degree::Quintic];
 

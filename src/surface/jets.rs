@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::SurfaceJet;
-use super::block::{BLOCK, JetBlock, Lanes};
+use super::bspline::block::{BLOCK, JetBlock, Lanes};
 use super::parametric::on_ground;
 
 /// Derivatives at [`BLOCK`] nodes: those of a [`SurfaceJet`] side by side, without the points.

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{HeightJet, HeightSurface};
-use crate::Sym2;
+use crate::linalg::Sym2;
 
 /// A smooth map `S` from grid coordinates into space.
 ///
@@ -233,8 +233,10 @@ pub(super) fn on_ground(at: DVec2, DVec2 { x, y }: DVec2, jet: &HeightJet) -> Su
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
-    use crate::{Control, Crs, FitOptions};
+    use crate::control::Control;
+    use crate::surface::FitOptions;
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::Crs;
 
     #[test]
     fn a_height_surface_in_space_has_its_own_forms() {

@@ -3,11 +3,8 @@
 //! [`Terrain::open`] tells the format by content first, by extension second, reads it, and brings everything to
 //! one form at the door: heights in metres, `NaN` for voids, row 0 in the north.
 
-mod ascii_grid;
 mod crs;
-mod geotiff;
-mod hgt;
-mod tiff;
+mod formats;
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -17,11 +14,11 @@ use std::path::Path;
 use glam::DVec2;
 use rayon::prelude::*;
 
-pub mod synthetic;
-
 pub use self::crs::Crs;
 pub(crate) use self::crs::GeoKeys;
-use crate::{Error, GridFrame, Result};
+use self::formats::{ascii_grid, geotiff, hgt};
+use crate::error::{Error, Result};
+use crate::grid::GridFrame;
 
 /// Heights at the nodes of a grid, in metres; `NaN` marks a void.
 ///
@@ -379,7 +376,7 @@ impl Format {
         if head.is_empty() {
             return Err(Error::format(path, "the file is empty"));
         }
-        if tiff::Tiff::is_tiff(head) {
+        if geotiff::is_tiff(head) {
             return Ok(Self::GeoTiff);
         }
         if ascii_grid::is_header(&text) {
@@ -450,7 +447,7 @@ impl Format {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     fn frame(cols: usize, rows: usize) -> GridFrame {
         GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap()

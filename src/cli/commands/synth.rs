@@ -1,7 +1,7 @@
 //! `ridgeway synth`: synthetic terrains.
 
 use ridgeway::export::Samples;
-use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{Control, Crs, Result, Terrain};
 use serde_json::json;
 

@@ -35,7 +35,8 @@ use super::field::{AREA, TensorField};
 use super::source::Seeds;
 use super::tiles::Values;
 use super::update::{ROUNDING, UNREACHED, greatest};
-use crate::{Control, Result};
+use crate::control::Control;
+use crate::error::Result;
 
 /// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first
 /// leaves undone the second sees. In a prototype the first round left .3 to 7 % of the first-order error, the

@@ -9,7 +9,8 @@ use super::FirstOrder;
 use super::feet::{Feet, Input, Surroundings};
 use super::strip::STRIP;
 use super::transport::carry;
-use crate::{Control, Result};
+use crate::control::Control;
+use crate::error::Result;
 
 /// Tiles, in strips of [`STRIP`] side by side, with their feet. Grows where the correction is carried beyond.
 pub(super) struct Patch<'a> {

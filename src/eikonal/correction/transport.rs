@@ -15,7 +15,8 @@ use super::super::update::{ALL, Block, Lines, choose, lanes};
 use super::feet::{self, BEFORE, BEHIND, Feet, Line};
 use super::patch::Patch;
 use super::triangle::Triangle;
-use crate::{Control, Result};
+use crate::control::Control;
+use crate::error::Result;
 
 /// Sweeps over a tile before it goes back into the queue, and times it may come back.
 const MOST_SWEEPS: usize = 40;

@@ -2,8 +2,10 @@
 
 use rayon::prelude::*;
 
+use crate::control::Control;
+use crate::error::Result;
+use crate::surface::ParametricSurface;
 use crate::surface::{BLOCK, JetBlock, Lanes, SurfaceJets};
-use crate::{Control, ParametricSurface, Result};
 
 /// A surface cut into regions.
 pub(super) struct Cut<'a> {

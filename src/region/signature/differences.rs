@@ -9,8 +9,9 @@ use super::cut::Run;
 use super::extent::Size;
 use super::moments::Moments;
 use super::tensors::{MISSING, Tensor, Tensors, apart, sum};
+use crate::linalg::Sym2;
+use crate::surface::SurfaceJet;
 use crate::surface::{BLOCK, Lanes};
-use crate::{SurfaceJet, Sym2};
 
 /// Distance of the neighbours on the surface as a share of the region's size. Finite, or opposite neighbours would not
 /// differ and two of the eigenvalues be 0.

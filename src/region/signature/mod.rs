@@ -21,7 +21,9 @@ use self::differences::{along_grid, along_surface};
 use self::extent::{Extent, Size, extents};
 use self::moments::{Moments, eigenvalues};
 use self::tensors::Tensors;
-use crate::{Control, Error, ParametricSurface, Result};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::surface::ParametricSurface;
 
 /// Eigenvalues of the covariance of the neighbour differences over a region, largest first, 0 or more.
 ///
@@ -112,8 +114,10 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::terrain::synthetic::{Synthetic, SyntheticKind};
-    use crate::{Crs, FitOptions, HeightSurface, SurfaceJet, Sym2};
+    use crate::linalg::Sym2;
+    use crate::surface::{FitOptions, HeightSurface, SurfaceJet};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::Crs;
 
     /// Two bumps and a dent over the unit disc, size `scale`, seen through the parameters `x = φ(u)`.
     #[derive(Clone, Copy, Debug)]

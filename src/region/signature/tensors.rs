@@ -8,9 +8,11 @@ use rayon::prelude::*;
 
 use super::cut::{Cut, Run};
 use super::extent::Size;
+use crate::control::Control;
+use crate::error::Result;
 use crate::metric::of_surface;
+use crate::surface::SurfaceJet;
 use crate::surface::{BLOCK, Lanes};
-use crate::{Control, Result, SurfaceJet};
 
 /// A symmetric tensor in space as `xx, yy, zz, √2 yz, √2 xz, √2 xy`: the length of the vector is the Frobenius norm.
 pub(super) type Tensor = [f64; 6];

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::{DVec3, DVec4, Vec4Swizzles};
 
 use super::{Knots, check_weights, coincide, homogeneous, size};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// A rational B-spline curve in space: profile, section or trajectory of a [`NurbsSurface`](super::NurbsSurface).
 #[derive(Clone, Debug, PartialEq)]

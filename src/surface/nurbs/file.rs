@@ -8,7 +8,7 @@ use glam::DVec4;
 use serde::{Deserialize, Serialize};
 
 use super::{Knots, NurbsSurface};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// The longest file, bytes: a million control points with all their digits are half of it.
 const LONGEST: u64 = 1 << 28;

@@ -3,8 +3,8 @@
 use glam::DVec2;
 
 use super::{Basis, NurbsSurface, SMALL, size};
+use crate::error::{Error, Result};
 use crate::surface::parametric::{Measures, ParametricSurface, SurfaceJet, measured};
-use crate::{Error, Result};
 
 /// A [`NurbsSurface`] whose parameters are those of a grid: equal steps of the surface's own, from end to end of its domain or,
 /// where it is closed, once round.

@@ -1,6 +1,6 @@
 //! One parameter of a spline: its degree and its knots.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// Degree and knots `u_0 ≤ u_1 ≤ …` of B-splines `N_i`, one for each control point; `N_i` lives on `u_i … u_{i+p+1}`.
 ///

@@ -21,7 +21,7 @@ pub use self::grid::NurbsGrid;
 use self::knots::Basis;
 pub use self::knots::Knots;
 use super::SurfaceJet;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// A rational tensor-product B-spline surface (Piegl and Tiller, The NURBS Book, chapter 4):
 ///

@@ -4,7 +4,7 @@ use glam::{DVec3, DVec4, Vec4Swizzles};
 
 use super::curve::{inserted, interpolated, interpolating, ring, ring_knots};
 use super::{Knots, NurbsCurve, NurbsSurface, SMALL};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 impl NurbsSurface {
     /// The surface that a profile makes when it turns about the line through `origin` along `axis`, exactly (The NURBS Book,

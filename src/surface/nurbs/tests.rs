@@ -1,7 +1,9 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::{Control, Metric, ParametricSurface};
+use crate::control::Control;
+use crate::metric::Metric;
+use crate::surface::ParametricSurface;
 
 /// A half circle of radius 2 about the origin from the top of the z axis to its bottom.
 fn meridian() -> NurbsCurve {

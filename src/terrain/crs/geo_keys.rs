@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::{Crs, length_unit, unit_name};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// The GeoKey directory of a GeoTIFF and the values it points to (OGC 19-008r4, section 7.1).
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -10,8 +10,10 @@ use rayon::prelude::*;
 
 use super::banded::Banded;
 use super::fit::{Axis, Fit, LANES, stripes};
-use super::plan::Plan;
-use crate::{Control, GridFrame, Result};
+use super::knots::Plan;
+use crate::control::Control;
+use crate::error::Result;
+use crate::grid::GridFrame;
 
 /// Most refits. On waves with noise around a hole (the test of heights beside voids) the largest change of
 /// curvature against the fit without a hole is 0.063, 0.057, 0.055 and 0.053 /m after 0, 2, 4 and 100.
@@ -28,7 +30,7 @@ const SHORTEST_CUTOFF: f64 = 4.0;
 const REACH: f64 = 4.0;
 
 /// Fits the finite heights only; at least one must be.
-pub(super) fn fit_finite(
+pub(in crate::surface) fn fit_finite(
     frame: &GridFrame,
     heights: &[f64],
     plan: &Plan,
@@ -50,7 +52,7 @@ pub(super) fn fit_finite(
 }
 
 /// Heights with the voids filled by continuing rows and columns, within one range of the data beyond them.
-pub(super) fn fill(
+pub(in crate::surface) fn fill(
     frame: &GridFrame,
     heights: &[f64],
     plan: &Plan,

@@ -8,9 +8,9 @@ use std::ops::Range;
 use glam::DVec2;
 use multiversion::multiversion;
 
-use super::HeightJet;
 use super::basis::{Local, SUPPORT};
 use super::fit::{Axis, Fit, dot};
+use crate::surface::HeightJet;
 
 /// Side of a block in nodes.
 pub(crate) const BLOCK: usize = 16;
@@ -65,7 +65,7 @@ type Contracted = [Lanes; 3];
 impl Fit {
     /// Jets at the nodes of the grid in columns `col ..` and rows `rows`, at most [`BLOCK`] of them. `per_metre` are the
     /// nodes per metre along each row of the grid and across it.
-    pub(super) fn jets(
+    pub(in crate::surface) fn jets(
         &self,
         per_metre: &[DVec2],
         col: usize,
@@ -165,9 +165,10 @@ fn accumulate(sum: &mut Lanes, weight: f64, values: &Lanes) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::plan::Plan;
+    use super::super::knots::Plan;
     use super::*;
-    use crate::{Control, GridFrame, Ground};
+    use crate::control::Control;
+    use crate::grid::{GridFrame, Ground};
 
     #[test]
     fn wide_registers_change_no_bit() {

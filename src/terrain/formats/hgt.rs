@@ -8,8 +8,8 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::{Crs, Raster, Source};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
+use crate::terrain::{Crs, Raster, Source};
 
 /// Nodes along a side: 3″ and 1″ tiles.
 const SIDES: [usize; 2] = [1201, 3601];
@@ -18,7 +18,7 @@ const LARGEST: u64 = 2 * 3601 * 3601;
 const VOID: i16 = i16::MIN;
 
 /// Reads a tile that has been unpacked; `path` gives the place.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
+pub(in crate::terrain) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
     let Some(side) = SIDES.into_iter().find(|side| 2 * side * side == bytes.len()) else {
         return Err(Error::format(
             path,
@@ -76,12 +76,12 @@ fn south_west_corner(path: &Path) -> Option<DVec2> {
 }
 
 /// Unpacks a gzip, to the size of the largest tile and no further.
-pub(super) fn gunzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
+pub(in crate::terrain) fn gunzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
     at_most_a_tile(path, flate2::read::MultiGzDecoder::new(bytes))
 }
 
 /// Unpacks the one tile of a zip archive.
-pub(super) fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
+pub(in crate::terrain) fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
     let fault =
         |e: zip::result::ZipError| Error::format(path, format!("the zip archive is damaged: {e}"));
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(fault)?;

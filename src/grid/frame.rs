@@ -20,7 +20,7 @@
 
 use glam::DVec2;
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 
 /// How one unit of map coordinates measures on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]

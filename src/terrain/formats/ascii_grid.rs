@@ -8,8 +8,8 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::{Crs, Raster, Source};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
+use crate::terrain::{Crs, Raster, Source};
 
 /// A fault is a sentence; [`read`] adds the path.
 type Checked<T> = std::result::Result<T, String>;
@@ -18,12 +18,12 @@ type Checked<T> = std::result::Result<T, String>;
 const DEFAULT_NODATA: f64 = -9999.0;
 
 /// Whether lower-case text begins with a keyword of the header.
-pub(super) fn is_header(text: &str) -> bool {
+pub(in crate::terrain) fn is_header(text: &str) -> bool {
     ["ncols", "nrows", "xll", "yll", "cellsize", "nodata_value"].iter().any(|k| text.starts_with(k))
 }
 
 /// Reads a grid.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
+pub(in crate::terrain) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut tokens = bytes.split(u8::is_ascii_whitespace).filter(|t| !t.is_empty()).peekable();
     let mut header = Header::default();

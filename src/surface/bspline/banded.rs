@@ -6,13 +6,13 @@ use super::basis::SUPPORT;
 
 /// A symmetric band matrix; `rows[i][d]` is the entry at `(i, i − d)`.
 #[derive(Clone, Debug)]
-pub(super) struct Banded {
+pub(in crate::surface) struct Banded {
     rows: Vec<[f64; SUPPORT]>,
 }
 
 /// The factors `L D Lᵀ` of a [`Banded`], `L` with a unit diagonal.
 #[derive(Clone, Debug)]
-pub(super) struct Ldl {
+pub(in crate::surface) struct Ldl {
     /// `lower[i][d]` is `L` at `(i, i − d)`; `lower[i][0]` holds `1/D_i`.
     lower: Vec<[f64; SUPPORT]>,
     band: usize,
@@ -20,12 +20,12 @@ pub(super) struct Ldl {
 
 impl Banded {
     /// The zero matrix of order `n`.
-    pub(super) fn zero(n: usize) -> Self {
+    pub(in crate::surface) fn zero(n: usize) -> Self {
         Self { rows: vec![[0.0; SUPPORT]; n] }
     }
 
     /// Adds `scale · v vᵀ`, where `v` holds `weights` from index `start` on.
-    pub(super) fn add_outer(&mut self, start: usize, weights: &[f64], scale: f64) {
+    pub(in crate::surface) fn add_outer(&mut self, start: usize, weights: &[f64], scale: f64) {
         for (i, &a) in weights.iter().enumerate() {
             for (j, &b) in weights[..=i].iter().enumerate() {
                 self.rows[start + i][i - j] += scale * a * b;
@@ -34,7 +34,7 @@ impl Banded {
     }
 
     /// Adds `scale · other`.
-    pub(super) fn add(&mut self, other: &Self, scale: f64) {
+    pub(in crate::surface) fn add(&mut self, other: &Self, scale: f64) {
         for (row, other) in self.rows.iter_mut().zip(&other.rows) {
             for (a, b) in row.iter_mut().zip(other) {
                 *a += scale * b;
@@ -45,7 +45,7 @@ impl Banded {
     /// Factors the matrix, whose entries lie within `band` of the diagonal (Golub and Van Loan, Matrix
     /// Computations, 4.3.5). A pivot lost to rounding is held at `ε` times its diagonal entry, which
     /// pins what the data leave undetermined.
-    pub(super) fn factor(self, band: usize) -> Ldl {
+    pub(in crate::surface) fn factor(self, band: usize) -> Ldl {
         let mut lower = self.rows;
         for i in 0..lower.len() {
             let mut row = lower[i];
@@ -72,7 +72,7 @@ impl Banded {
 
 impl Ldl {
     /// Solves `A X = B` in place for `W` right-hand sides side by side.
-    pub(super) fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
+    pub(in crate::surface) fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
         match self.band {
             3 => substitute::<3, W>(&self.lower, x),
             5 => substitute::<5, W>(&self.lower, x),
@@ -83,7 +83,7 @@ impl Ldl {
     /// The band of the inverse, `result[i][d]` at `(i, i − d)`, from the last row up (Hutchinson and
     /// de Hoog, Smoothing noisy data with spline functions, Numer. Math. 47, 1985):
     /// `Σ_ij = [i = j]/D_i − Σ_{k>i} L_ki Σ_kj` for `j ≥ i`.
-    pub(super) fn inverse_band(&self) -> Vec<[f64; SUPPORT]> {
+    pub(in crate::surface) fn inverse_band(&self) -> Vec<[f64; SUPPORT]> {
         let n = self.lower.len();
         let mut inverse = vec![[0.0; SUPPORT]; n];
         for i in (0..n).rev() {

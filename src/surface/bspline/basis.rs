@@ -1,10 +1,10 @@
 //! Uniform B-splines along one axis: which coefficients bear on a point, and with what weights.
 
 /// Most coefficients that bear on one point: degree 5 plus 1.
-pub(super) const SUPPORT: usize = 6;
+pub(in crate::surface) const SUPPORT: usize = 6;
 
 /// Derivatives that are evaluated: value, first, second, third.
-pub(super) const ORDERS: usize = 4;
+pub(in crate::surface) const ORDERS: usize = 4;
 
 /// Splines of odd degree `p` with equally spaced knots over the nodes `0 ..= nodes − 1`, one
 /// coefficient `c_0 … c_m` for each of the `m + 1` knots.
@@ -22,7 +22,7 @@ pub(super) const ORDERS: usize = 4;
 /// it leaves the polynomials of degree `m`; one knot, a constant. The outer coefficients are never
 /// stored: [`Basis::at`] folds their weights onto the inner ones.
 #[derive(Clone, Debug)]
-pub(super) struct Basis {
+pub(in crate::surface) struct Basis {
     degree: usize,
     intervals: usize,
     /// Knot intervals per node.
@@ -31,48 +31,48 @@ pub(super) struct Basis {
 
 /// The coefficients that bear on one point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Local {
+pub(in crate::surface) struct Local {
     /// Index of the first.
-    pub(super) start: usize,
+    pub(in crate::surface) start: usize,
     /// `weights[r][i]`: share of coefficient `start + i` in the `r`-th derivative, per node to the `r`.
-    pub(super) weights: [[f64; SUPPORT]; ORDERS],
+    pub(in crate::surface) weights: [[f64; SUPPORT]; ORDERS],
 }
 
 impl Basis {
     /// Splines of degree 3 or 5 over `nodes` nodes with `intervals < nodes` knot intervals.
-    pub(super) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
+    pub(in crate::surface) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
         debug_assert!(intervals < nodes && degree % 2 == 1 && degree < SUPPORT);
         let density = if nodes > 1 { intervals as f64 / (nodes - 1) as f64 } else { 1.0 };
         Self { degree, intervals, density }
     }
 
     /// Degree of the splines.
-    pub(super) fn degree(&self) -> usize {
+    pub(in crate::surface) fn degree(&self) -> usize {
         self.degree
     }
 
     /// Number of coefficients.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::surface) fn len(&self) -> usize {
         self.intervals + 1
     }
 
     /// Number of knot intervals.
-    pub(super) fn intervals(&self) -> usize {
+    pub(in crate::surface) fn intervals(&self) -> usize {
         self.intervals
     }
 
     /// Knot intervals per node, at most 1.
-    pub(super) fn density(&self) -> f64 {
+    pub(in crate::surface) fn density(&self) -> f64 {
         self.density
     }
 
     /// Coefficients that bear on one point, at most [`SUPPORT`].
-    pub(super) fn support(&self) -> usize {
+    pub(in crate::surface) fn support(&self) -> usize {
         self.degree.min(self.intervals) + 1
     }
 
     /// The coefficients and weights at `t`, counted in nodes.
-    pub(super) fn at(&self, t: f64) -> Local {
+    pub(in crate::surface) fn at(&self, t: f64) -> Local {
         let x = t * self.density;
         let knot = (x.max(0.0) as usize).min(self.intervals.saturating_sub(1));
         let reach = (self.degree - 1) / 2;

@@ -9,13 +9,18 @@ use std::path::Path;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::crs::{Crs, GeoKeys, key, length_unit};
 use super::tiff::{Directory, Fault, Layout, Outcome, Sample, Tiff, damaged, tag, unsupported};
-use super::{Raster, Source, Want};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
+use crate::terrain::crs::{Crs, GeoKeys, key, length_unit};
+use crate::terrain::{Raster, Source, Want};
+
+/// Whether a file that begins so is a TIFF.
+pub(in crate::terrain) fn is_tiff(head: &[u8]) -> bool {
+    Tiff::is_tiff(head)
+}
 
 /// Reads a GeoTIFF that lies in memory.
-pub(super) fn read(path: &Path, bytes: &[u8], want: Want) -> Result<Raster> {
+pub(in crate::terrain) fn read(path: &Path, bytes: &[u8], want: Want) -> Result<Raster> {
     read_image(path, bytes, want).map_err(|fault| match fault {
         Fault::Damaged(message) => Error::format(path, message),
         Fault::Unsupported(message) => Error::unsupported(path, message),
@@ -500,17 +505,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("dem.tif");
         fs::write(&path, int16(&[1, 2, 3, 4]).bytes()).unwrap();
-        let terrain = crate::Terrain::open(&path).unwrap();
+        let terrain = crate::terrain::Terrain::open(&path).unwrap();
         assert_eq!(terrain.frame().step(), DVec2::ONE);
         assert_eq!(terrain.frame().origin(), DVec2::new(0.5, 1.5));
         assert!(terrain.notes().iter().any(|n| n.contains("no place")));
         fs::write(path.with_extension("tfw"), "5\n0\n0\n-5\n1002.5\n2002.5\n").unwrap();
-        let terrain = crate::Terrain::open(&path).unwrap();
+        let terrain = crate::terrain::Terrain::open(&path).unwrap();
         assert_eq!(terrain.frame().origin(), DVec2::new(1002.5, 2002.5));
         assert_eq!(terrain.frame().step(), DVec2::splat(5.0));
         assert_eq!(terrain.heights(), [1.0, 2.0, 3.0, 4.0]);
         fs::write(path.with_extension("tfw"), "5\n1\n1\n-5\n1002.5\n2002.5\n").unwrap();
-        assert!(crate::Terrain::open(&path).unwrap_err().to_string().contains("gdalwarp"));
+        assert!(crate::terrain::Terrain::open(&path).unwrap_err().to_string().contains("gdalwarp"));
     }
 
     #[test]
@@ -520,7 +525,7 @@ mod tests {
         let header =
             "ncols 2\nnrows 2\nxllcorner -118.2\nyllcorner 34.6\ncellsize 0.0008333\n1 2 3 4";
         fs::write(&path, header).unwrap();
-        let terrain = crate::Terrain::open(&path).unwrap();
+        let terrain = crate::terrain::Terrain::open(&path).unwrap();
         assert_eq!(terrain.crs().epsg(), Some(4326));
         assert!(terrain.notes().iter().any(|n| n.contains("degrees")));
     }

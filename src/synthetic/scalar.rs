@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use crate::HeightJet;
+use crate::surface::HeightJet;
 
 /// A number (`f64`) or a number with its first and second derivatives ([`Jet`]).
 ///

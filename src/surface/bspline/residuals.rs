@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::fit::Fit;
-use crate::GridFrame;
+use crate::grid::GridFrame;
 
 /// How far the surface lies from the heights it was fitted to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Residuals {
 }
 
 /// Residuals of a fit over the finite heights.
-pub(super) fn residuals(frame: &GridFrame, fit: &Fit, heights: &[f64]) -> Residuals {
+pub(in crate::surface) fn residuals(frame: &GridFrame, fit: &Fit, heights: &[f64]) -> Residuals {
     let rows: Vec<(f64, usize, f64, usize)> = heights
         .par_chunks(frame.cols())
         .enumerate()

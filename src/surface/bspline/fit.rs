@@ -33,8 +33,10 @@ use rayon::prelude::*;
 
 use super::banded::{Banded, Ldl};
 use super::basis::{Basis, Local, SUPPORT};
-use super::plan::Plan;
-use crate::{Control, GridFrame, Result};
+use super::knots::Plan;
+use crate::control::Control;
+use crate::error::Result;
+use crate::grid::GridFrame;
 
 /// Name of the stage in progress reports.
 const STAGE: &str = "fitting surface";
@@ -45,24 +47,24 @@ const STAGE: &str = "fitting surface";
 const LONGEST_CUTOFF: f64 = 64.0;
 
 /// Columns, or rows, that are solved together.
-pub(super) const LANES: usize = 16;
+pub(in crate::surface) const LANES: usize = 16;
 
 /// Relative difference of cut-offs that is not felt: a wave at the cut-off keeps 0.5 ± 0.0015 of its amplitude.
 const SHARED: f64 = 1e-3;
 
 /// Splines along one axis and their values at the nodes.
 #[derive(Clone, Debug)]
-pub(super) struct Axis {
-    pub(super) basis: Basis,
-    pub(super) nodes: Vec<Local>,
+pub(in crate::surface) struct Axis {
+    pub(in crate::surface) basis: Basis,
+    pub(in crate::surface) nodes: Vec<Local>,
     /// Nodes around the middle one that have its weights, each one coefficient further on than the node before.
-    pub(super) uniform: Range<usize>,
+    pub(in crate::surface) uniform: Range<usize>,
     /// `Σ_i v_i v_iᵀ` with `v_i` the weights at node `i`.
     gram: Banded,
 }
 
 impl Axis {
-    pub(super) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
+    pub(in crate::surface) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
         let basis = Basis::new(degree, nodes, intervals);
         let nodes: Vec<Local> = (0..nodes).map(|i| basis.at(i as f64)).collect();
         let mut gram = Banded::zero(basis.len());
@@ -74,7 +76,7 @@ impl Axis {
     }
 
     /// Matrix of `∫ (d^order s/dt^order)² dt`, by Gauss's three points per interval: exact to degree 5.
-    pub(super) fn penalty(&self, order: usize) -> Banded {
+    pub(in crate::surface) fn penalty(&self, order: usize) -> Banded {
         const GAUSS: [(f64, f64); 3] = [
             (0.112_701_665_379_258_3, 5.0 / 18.0),
             (0.5, 8.0 / 18.0),
@@ -92,7 +94,7 @@ impl Axis {
     }
 
     /// A cut-off of `cells` nodes, kept where the equations are sound.
-    pub(super) fn cutoff(&self, cells: f64) -> f64 {
+    pub(in crate::surface) fn cutoff(&self, cells: f64) -> f64 {
         // Fewer knots than nodes without smoothing may leave a coefficient almost without data where
         // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and is not felt otherwise.
         let shortest = if self.basis.len() < self.nodes.len() { 0.3 } else { 0.0 };
@@ -130,7 +132,7 @@ impl Axis {
     }
 
     /// Trace of the matrix that takes heights to fitted heights.
-    pub(super) fn trace(&self, cells: f64) -> f64 {
+    pub(in crate::surface) fn trace(&self, cells: f64) -> f64 {
         let inverse = self.normal(&self.penalty(3), cells).inverse_band();
         let form = |node: &Local| -> f64 {
             let weights = &node.weights[0][..self.basis.support()];
@@ -154,7 +156,7 @@ impl Axis {
 
     /// Heights at all nodes of the fit to the finite heights of a line; `penalty` is that of the
     /// derivative `order`.
-    pub(super) fn complete(
+    pub(in crate::surface) fn complete(
         &self,
         penalty: &Banded,
         order: i32,
@@ -201,15 +203,15 @@ fn project<const N: usize, const W: usize>(
 
 /// Coefficients of a tensor-product spline, row-major, and its two axes.
 #[derive(Clone, Debug)]
-pub(super) struct Fit {
-    pub(super) x: Axis,
-    pub(super) y: Axis,
-    pub(super) coefficients: Vec<f64>,
+pub(in crate::surface) struct Fit {
+    pub(in crate::surface) x: Axis,
+    pub(in crate::surface) y: Axis,
+    pub(in crate::surface) coefficients: Vec<f64>,
 }
 
 impl Fit {
     /// Fits heights without voids.
-    pub(super) fn new(
+    pub(in crate::surface) fn new(
         frame: &GridFrame,
         heights: &[f64],
         plan: &Plan,
@@ -231,7 +233,7 @@ impl Fit {
     }
 
     /// Values at the nodes of a row.
-    pub(super) fn row_values(&self, row: usize, values: &mut [f64]) {
+    pub(in crate::surface) fn row_values(&self, row: usize, values: &mut [f64]) {
         let (width, support) = (self.x.basis.len(), self.x.basis.support());
         let node = &self.y.nodes[row];
         let mut line = vec![0.0; width];
@@ -252,7 +254,7 @@ impl Fit {
     }
 
     /// `z` differentiated `orders[k]` times along columns and rows, per node, at grid coordinates `at`.
-    pub(super) fn derivatives<const K: usize>(
+    pub(in crate::surface) fn derivatives<const K: usize>(
         &self,
         at: DVec2,
         orders: [[usize; 2]; K],
@@ -281,7 +283,7 @@ fn uniform(nodes: &[Local]) -> Range<usize> {
     first..(middle..nodes.len()).take_while(like).last().map_or(middle, |last| last + 1)
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(in crate::surface) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -366,7 +368,7 @@ fn solve_columns(
 }
 
 /// Stripes of [`LANES`] columns as lists of row pieces, so that threads can write them without overlap.
-pub(super) fn stripes(values: &mut [f64], width: usize) -> Vec<Vec<&mut [f64]>> {
+pub(in crate::surface) fn stripes(values: &mut [f64], width: usize) -> Vec<Vec<&mut [f64]>> {
     let rows = values.len() / width;
     let mut stripes: Vec<_> =
         (0..width.div_ceil(LANES)).map(|_| Vec::with_capacity(rows)).collect();

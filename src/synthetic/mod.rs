@@ -30,7 +30,11 @@ use rayon::prelude::*;
 
 use self::noise::{gradient_noise, hash, ridged, uniform_pair};
 use self::scalar::{Jet, Scalar};
-use crate::{Control, Crs, Error, GridFrame, Ground, HeightJet, Result, Terrain};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::grid::{GridFrame, Ground};
+use crate::surface::HeightJet;
+use crate::terrain::{Crs, Terrain};
 
 /// The shapes there are. `h` is the relief, `a` half the longer side, both in metres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

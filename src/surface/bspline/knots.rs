@@ -5,7 +5,9 @@ use glam::DVec2;
 use super::fit::Fit;
 use super::residuals::residuals;
 use super::voids::fill;
-use crate::{Control, GridFrame, Result};
+use crate::control::Control;
+use crate::error::Result;
+use crate::grid::GridFrame;
 
 /// Knot intervals per cut-off wavelength: what a longer cut-off removes needs no knots. With 16 the
 /// spline's own error in the second derivative of a wave of that length, `(ωh)²/12`, is 1.3 %.
@@ -13,23 +15,23 @@ const KNOTS_PER_CUTOFF: f64 = 16.0;
 
 /// What to fit: the knots and the smoothing.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plan {
+pub(in crate::surface) struct Plan {
     /// Degree of the splines, 3 or 5.
-    pub(super) degree: usize,
+    pub(in crate::surface) degree: usize,
     /// Knot intervals along columns (`x`) and rows (`y`).
-    pub(super) intervals: [usize; 2],
+    pub(in crate::surface) intervals: [usize; 2],
     /// Cut-off wavelength in metres; 0 for none.
-    pub(super) cutoff: f64,
+    pub(in crate::surface) cutoff: f64,
 }
 
 impl Plan {
     /// Knots at all nodes: the spline interpolates.
-    pub(super) fn every_node(frame: &GridFrame, degree: usize) -> Self {
+    pub(in crate::surface) fn every_node(frame: &GridFrame, degree: usize) -> Self {
         Self { degree, intervals: [frame.cols() - 1, frame.rows() - 1], cutoff: 0.0 }
     }
 
     /// No more knots than a cut-off of `cutoff` metres needs.
-    pub(super) fn smooth(frame: &GridFrame, degree: usize, cutoff: f64) -> Self {
+    pub(in crate::surface) fn smooth(frame: &GridFrame, degree: usize, cutoff: f64) -> Self {
         let needed = |nodes: usize, spacing: f64| {
             let intervals = (nodes - 1) as f64 * spacing * KNOTS_PER_CUTOFF / cutoff;
             (intervals.ceil() as usize).max(degree).min(nodes - 1)
@@ -40,7 +42,7 @@ impl Plan {
     }
 
     /// About square knot intervals, `longer` of them along the side that is longer in metres; no smoothing.
-    pub(super) fn coarse(frame: &GridFrame, degree: usize, longer: usize) -> Self {
+    pub(in crate::surface) fn coarse(frame: &GridFrame, degree: usize, longer: usize) -> Self {
         let most = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
         let extent = most * frame.mid_spacing();
         let share = (extent / extent.max_element().max(f64::MIN_POSITIVE)) * longer as f64;
@@ -50,13 +52,13 @@ impl Plan {
 }
 
 /// Side in metres of a square as large as a cell in the middle of the grid.
-pub(super) fn mean_cell(frame: &GridFrame) -> f64 {
+pub(in crate::surface) fn mean_cell(frame: &GridFrame) -> f64 {
     let DVec2 { x, y } = frame.mid_spacing();
     (x * y).sqrt()
 }
 
 /// The plan with the fewest knots whose residuals have a root mean square of at most `rms`, by bisection.
-pub(super) fn fewest_knots(
+pub(in crate::surface) fn fewest_knots(
     frame: &GridFrame,
     heights: &[f64],
     degree: usize,
@@ -93,7 +95,7 @@ pub(super) fn fewest_knots(
 ///
 /// where `A = A_y ⊗ A_x` takes heights to fitted heights, a separable fit's trace being the product.
 /// Lengths by powers of two from 2 cells to half the extent, then a golden section around the best.
-pub(super) fn cross_validate(
+pub(in crate::surface) fn cross_validate(
     frame: &GridFrame,
     heights: &[f64],
     degree: usize,
@@ -173,7 +175,7 @@ fn window(frame: &GridFrame, heights: &[f64]) -> Result<(GridFrame, Vec<f64>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ground;
+    use crate::grid::Ground;
 
     #[test]
     fn the_window_finds_the_only_heights_of_a_large_grid() {

@@ -16,7 +16,8 @@ use proj4rs::adaptors::transform_xy;
 pub(crate) use self::geo_keys::GeoKeys;
 pub(super) use self::geo_keys::key;
 use self::wkt::{geographic_code, utm_code, wkt_authority, wkt_ellipsoid, wkt_name, wkt_unit};
-use crate::{Error, Ground, Result};
+use crate::error::{Error, Result};
+use crate::grid::Ground;
 
 /// The coordinate reference system of a terrain.
 #[derive(Clone, Debug, PartialEq)]

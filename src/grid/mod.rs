@@ -1,0 +1,5 @@
+//! Grids: where nodes lie, and what geometry touches them.
+
+mod frame;
+
+pub use self::frame::{GridFrame, Ground};
