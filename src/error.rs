@@ -1,83 +1,423 @@
-//! The one error of the crate: few kinds, each a sentence that says where, what was found, what was
-//! expected and what to try.
+//! The one error of the crate: few kinds, each with what is known of it as fields.
+//!
+//! ```
+//! use ridgeway::error::{Error, Location};
+//!
+//! let error = Error::argument("the cost", -1, "above 0").at_node(3, 4).advise("mark barriers by NaN");
+//! assert_eq!(error.to_string(), "the cost at column 3, row 4 is -1; it must be above 0; mark barriers by NaN");
+//! let Error::Argument(mismatch) = error else { unreachable!() };
+//! assert_eq!(mismatch.at, Some(Location::Node { col: 3, row: 4 }));
+//! ```
 
+use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
+
+use glam::{DVec2, DVec3};
+
+/// `Result` with the crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
 
 /// What can go wrong, by who can mend it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file contradicts its own format: cut, damaged, or not what its name says.
-    #[error("{}: {message}", path.display())]
+    /// A file contradicts its own format: cut short, damaged, or not what its name says.
+    #[error("{}: {mismatch}", path.display())]
     Format {
         /// The file.
         path: PathBuf,
-        /// What was found, what was expected, what to try.
-        message: String,
+        /// What in it is not as it must be.
+        mismatch: Box<Mismatch>,
     },
-    /// The file is in order but holds something this crate does not read or write.
-    #[error("{}: {message}", path.display())]
+    /// A file is in order but holds something that this crate does not read or write.
+    #[error("{}: {found}{}", path.display(), clause(advice))]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What was found and how to convert it.
-        message: String,
+        /// What it holds.
+        found: String,
+        /// How to make a file of it that can be read.
+        advice: String,
     },
     /// The caller asked for something impossible: a place outside the grid, a negative length, …
     #[error("{0}")]
-    Usage(String),
+    Argument(Box<Mismatch>),
+    /// No path leads from the start to the goal.
+    #[error(
+        "no path leads from the start to the goal at {goal}{}{}",
+        between_clause(between),
+        nearest_clause(nearest)
+    )]
+    NoPath {
+        /// The goal.
+        goal: Location,
+        /// What there is on this ground that closes places to every path.
+        between: Vec<Obstacle>,
+        /// The place nearest to the goal that a path leads to, where somebody looked for it.
+        nearest: Option<Location>,
+    },
+    /// The distance does not converge: the tensors of the metric are too extreme.
+    #[error(
+        "the distance has not converged after {activations} activations of tiles{}; the tensors of the metric are too extreme",
+        at_clause(at)
+    )]
+    NotConverged {
+        /// How often a tile was solved before the solver gave up.
+        activations: usize,
+        /// A place where the distance still changed.
+        at: Option<Location>,
+    },
+    /// Something needs more memory than there is, or than is ever granted.
+    #[error("{what} needs {} of memory, {}", size(*bytes), limit_clause(*limit))]
+    TooLarge {
+        /// What needs it.
+        what: String,
+        /// How much of it, in bytes.
+        bytes: u64,
+        /// The most that is granted, in bytes; `None` if the machine refused.
+        limit: Option<u64>,
+    },
     /// Reading or writing failed.
-    #[error("{}: {}", path.display(), advice(source))]
+    #[error("{}: {}", path.display(), cause(source))]
     Io {
         /// The file.
         path: PathBuf,
         /// The cause.
         source: io::Error,
     },
-    /// There is no way between start and goal.
+    /// The work was cancelled through a [`CancelToken`](crate::CancelToken).
+    #[error("cancelled")]
+    Cancelled,
+    /// Gives way to [`Error::Argument`].
+    #[doc(hidden)]
+    #[error("{0}")]
+    Usage(String),
+    /// Gives way to [`Error::NoPath`].
+    #[doc(hidden)]
     #[error("{0}")]
     NoWay(String),
-    /// The work was cancelled through a [`CancelToken`](crate::CancelToken).
-    #[error("cancelled; nothing was written")]
-    Cancelled,
 }
 
-/// What went wrong with a file, and what to do where that is known.
-fn advice(source: &io::Error) -> String {
+/// Something that is not as it must be: `what`, at a place, is `found` and must be `expected`.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Mismatch {
+    /// The thing: a noun in the singular with its article, such as `the climb weight`.
+    pub what: String,
+    /// Where it stands.
+    pub at: Option<Location>,
+    /// What it is.
+    pub found: String,
+    /// What it must be; `None` if that goes without saying, as of a damaged archive.
+    pub expected: Option<String>,
+    /// What to do, where that is known.
+    pub advice: Option<String>,
+}
+
+/// Where in an input something stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Location {
+    /// A node of the grid, counted from the north-west one.
+    Node {
+        /// Column.
+        col: usize,
+        /// Row.
+        row: usize,
+    },
+    /// Grid coordinates, `(column, row)`.
+    Grid(DVec2),
+    /// Map coordinates, `(x, y)`.
+    Map(DVec2),
+    /// A point in space, in metres.
+    Space(DVec3),
+    /// A line of a text, counted from 1.
+    Line(usize),
+    /// A byte of a file, counted from 0.
+    Byte(u64),
+}
+
+/// What closes places to every path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Obstacle {
+    /// Cells without a height.
+    Void,
+    /// Barriers.
+    Barrier,
+    /// Ground steeper than the limit.
+    Slope,
+    /// Places at which a raster gives no cost or no tensor.
+    NoValue,
+}
+
+impl Error {
+    /// An [`Error::Argument`]: `what`, a noun in the singular with its article, is `found` and must be `expected`.
+    pub fn argument(
+        what: impl Into<String>,
+        found: impl fmt::Display,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Argument(Box::new(Mismatch::new(what, found, expected)))
+    }
+
+    /// An [`Error::Unsupported`]: the file holds `found`; `advice` says how to make one that can be read.
+    pub fn unsupported_file(
+        path: impl AsRef<Path>,
+        found: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        Self::Unsupported {
+            path: path.as_ref().to_path_buf(),
+            found: found.into(),
+            advice: advice.into(),
+        }
+    }
+
+    /// An [`Error::Io`] for `path`.
+    pub fn io(path: impl AsRef<Path>, source: io::Error) -> Self {
+        Self::Io { path: path.as_ref().to_path_buf(), source }
+    }
+
+    /// Says where: for [`Error::Argument`] and [`Error::Format`]; the others stay as they are.
+    #[must_use]
+    pub fn at(mut self, at: Location) -> Self {
+        if let Self::Argument(mismatch) | Self::Format { mismatch, .. } = &mut self {
+            mismatch.at = Some(at);
+        }
+        self
+    }
+
+    /// [`at`](Self::at) a node.
+    #[must_use]
+    pub fn at_node(self, col: usize, row: usize) -> Self {
+        self.at(Location::Node { col, row })
+    }
+
+    /// Says what to do: for [`Error::Argument`] and [`Error::Format`]; the others stay as they are.
+    #[must_use]
+    pub fn advise(mut self, advice: impl Into<String>) -> Self {
+        if let Self::Argument(mismatch) | Self::Format { mismatch, .. } = &mut self {
+            mismatch.advice = Some(advice.into());
+        }
+        self
+    }
+
+    /// Lays the fault at the file that the argument came from: an [`Error::Argument`] becomes an [`Error::Format`];
+    /// the others stay as they are.
+    #[must_use]
+    pub fn in_file(self, path: impl AsRef<Path>) -> Self {
+        match self {
+            Self::Argument(mismatch) => {
+                Self::Format { path: path.as_ref().to_path_buf(), mismatch }
+            }
+            Self::Usage(message) => Self::format(path, message),
+            other => other,
+        }
+    }
+
+    #[doc(hidden)]
+    pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
+        Mismatch {
+            what: message.into(),
+            at: None,
+            found: String::new(),
+            expected: None,
+            advice: None,
+        }
+        .in_file(path)
+    }
+
+    #[doc(hidden)]
+    pub fn unsupported(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
+        Self::unsupported_file(path, message, "")
+    }
+
+    #[doc(hidden)]
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::Usage(message.into())
+    }
+}
+
+impl Mismatch {
+    /// `what`, a noun in the singular with its article, is `found` and must be `expected`.
+    pub fn new(
+        what: impl Into<String>,
+        found: impl fmt::Display,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self {
+            what: what.into(),
+            at: None,
+            found: found.to_string(),
+            expected: Some(expected.into()),
+            advice: None,
+        }
+    }
+
+    /// `what`, such as `the zip archive`, cannot be read because of `cause`.
+    pub fn damaged(what: impl Into<String>, cause: impl fmt::Display) -> Self {
+        Self {
+            what: what.into(),
+            at: None,
+            found: format!("damaged: {cause}"),
+            expected: None,
+            advice: None,
+        }
+    }
+
+    /// Says where.
+    #[must_use]
+    pub fn at(self, at: Location) -> Self {
+        Self { at: Some(at), ..self }
+    }
+
+    /// Says what to do.
+    #[must_use]
+    pub fn advise(self, advice: impl Into<String>) -> Self {
+        Self { advice: Some(advice.into()), ..self }
+    }
+
+    /// The [`Error::Format`] of a file in which this was found.
+    #[must_use]
+    pub fn in_file(self, path: impl AsRef<Path>) -> Error {
+        Error::Format { path: path.as_ref().to_path_buf(), mismatch: Box::new(self) }
+    }
+}
+
+impl fmt::Display for Mismatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { what, at, found, expected, advice } = self;
+        write!(f, "{what}{}", at_clause(at))?;
+        if !found.is_empty() {
+            write!(f, " is {found}")?;
+        }
+        if let Some(expected) = expected {
+            write!(f, "; it must be {expected}")?;
+        }
+        match advice {
+            Some(advice) => write!(f, "; {advice}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Node { col, row } => write!(f, "column {col}, row {row}"),
+            Self::Grid(at) => write!(f, "column {}, row {}", at.x, at.y),
+            Self::Map(at) => write!(f, "{}, {}", at.x, at.y),
+            Self::Space(at) => write!(f, "({}, {}, {})", at.x, at.y, at.z),
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+impl fmt::Display for Obstacle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Void => "voids",
+            Self::Barrier => "barriers",
+            Self::Slope => "too steep ground",
+            Self::NoValue => "places without a cost or tensor",
+        })
+    }
+}
+
+fn clause(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!("; {text}") }
+}
+
+fn at_clause(at: &Option<Location>) -> String {
+    at.map(|at| format!(" at {at}")).unwrap_or_default()
+}
+
+fn between_clause(between: &[Obstacle]) -> String {
+    let names: Vec<_> = between.iter().map(Obstacle::to_string).collect();
+    match &names[..] {
+        [] => String::new(),
+        [one] => format!(": {one} lie between"),
+        [first @ .., last] => format!(": {} or {last} lie between", first.join(", ")),
+    }
+}
+
+fn nearest_clause(nearest: &Option<Location>) -> String {
+    nearest.map(|at| format!("; the nearest place that can be reached is {at}")).unwrap_or_default()
+}
+
+fn limit_clause(limit: Option<u64>) -> String {
+    match limit {
+        Some(limit) => format!("more than the {} that is granted", size(limit)),
+        None => "which this machine does not have".to_owned(),
+    }
+}
+
+/// A number of bytes for people: `512 bytes`, `1.5 GB`.
+fn size(bytes: u64) -> String {
+    match bytes as f64 {
+        b if b < 1e6 => format!("{bytes} bytes"),
+        b if b < 1e9 => format!("{:.1} MB", b / 1e6),
+        b => format!("{:.1} GB", b / 1e9),
+    }
+}
+
+/// The cause in plain words where the system's are not.
+fn cause(source: &io::Error) -> String {
     match source.kind() {
-        io::ErrorKind::NotFound => {
-            "there is no such file; check its name and the folder you are in".into()
-        }
-        io::ErrorKind::IsADirectory => "is a folder; name a file".into(),
-        io::ErrorKind::PermissionDenied => {
-            "permission denied; check who may read and write it".into()
-        }
+        io::ErrorKind::NotFound => "there is no such file".into(),
+        io::ErrorKind::IsADirectory => "is a folder, not a file".into(),
+        io::ErrorKind::AlreadyExists => "exists".into(),
+        io::ErrorKind::PermissionDenied => "permission denied".into(),
         _ => source.to_string(),
     }
 }
 
-/// `Result` with the crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl Error {
-    /// A [`Error::Format`] for `path`.
-    pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
-        Self::Format { path: path.as_ref().to_path_buf(), message: message.into() }
+    #[test]
+    fn sentences_say_what_where_found_and_expected() {
+        let error = Error::argument("the climb weight", -1.5, "0 or more");
+        assert_eq!(error.to_string(), "the climb weight is -1.5; it must be 0 or more");
+        let error = Error::argument("the speed", 0, "above 0").at_node(3, 4).in_file("a.tif");
+        assert_eq!(
+            error.to_string(),
+            "a.tif: the speed at column 3, row 4 is 0; it must be above 0"
+        );
+        let zip = Mismatch::damaged("the zip archive", "no end").in_file("a.zip");
+        assert_eq!(zip.to_string(), "a.zip: the zip archive is damaged: no end");
     }
 
-    /// A [`Error::Unsupported`] for `path`.
-    pub fn unsupported(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
-        Self::Unsupported { path: path.as_ref().to_path_buf(), message: message.into() }
+    #[test]
+    fn no_path_tells_what_lies_between() {
+        let between = vec![Obstacle::Void, Obstacle::Barrier, Obstacle::Slope];
+        let goal = Location::Map(DVec2::new(1.5, 2.0));
+        let nearest = Some(Location::Node { col: 1, row: 2 });
+        assert_eq!(
+            Error::NoPath { goal, between, nearest }.to_string(),
+            "no path leads from the start to the goal at 1.5, 2: voids, barriers or too steep ground lie between; \
+             the nearest place that can be reached is column 1, row 2"
+        );
     }
 
-    /// A [`Error::Usage`].
-    pub fn usage(message: impl Into<String>) -> Self {
-        Self::Usage(message.into())
+    #[test]
+    fn sizes_read_well() {
+        let error = |limit| {
+            Error::TooLarge { what: "the raster".into(), bytes: 12_400_000_000, limit }.to_string()
+        };
+        assert_eq!(
+            error(None),
+            "the raster needs 12.4 GB of memory, which this machine does not have"
+        );
+        assert!(error(Some(300_000_000)).ends_with("more than the 300.0 MB that is granted"));
     }
 
-    /// A [`Error::Io`] for `path`.
-    pub fn io(path: impl AsRef<Path>, source: io::Error) -> Self {
-        Self::Io { path: path.as_ref().to_path_buf(), source }
+    #[test]
+    fn an_error_is_small() {
+        assert!(size_of::<Error>() <= 80, "{}", size_of::<Error>());
     }
 }

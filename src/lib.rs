@@ -69,7 +69,7 @@
 
 mod control;
 pub mod eikonal;
-mod error;
+pub mod error;
 pub mod export;
 mod grid;
 pub mod linalg;

@@ -17,7 +17,7 @@ fn main() -> ExitCode {
     match commands::run(&args::Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            eprintln!("error: {}", report::explain(&error));
             ExitCode::from(report::exit_code(&error))
         }
     }

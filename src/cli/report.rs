@@ -12,11 +12,29 @@ use crate::args::RunArgs;
 /// Process exit code of an error.
 pub(crate) fn exit_code(error: &Error) -> u8 {
     match error {
-        Error::NoWay(_) => 1,
+        Error::NoPath { .. } | Error::NoWay(_) => 1,
+        // A file in the way is a wrong use, not a fault of the disk.
+        Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => 2,
         Error::Io { .. } => 3,
         Error::Cancelled => 130,
         _ => 2,
     }
+}
+
+/// The error in the words of the command: what the library says, and what to do about it here.
+pub(crate) fn explain(error: &Error) -> String {
+    let advice = match error {
+        Error::Cancelled => "nothing was written",
+        Error::Io { source, .. } => match source.kind() {
+            ErrorKind::NotFound => "check its name and the folder you are in",
+            ErrorKind::IsADirectory => "name a file",
+            ErrorKind::PermissionDenied => "check who may read and write it",
+            ErrorKind::AlreadyExists => "give --overwrite to replace it",
+            _ => return error.to_string(),
+        },
+        _ => return error.to_string(),
+    };
+    format!("{error}; {advice}")
 }
 
 /// The outcome of a command, for people and for machines.
