@@ -11,7 +11,7 @@ mod face;
 mod output;
 
 use ridgeway::Error;
-use ridgeway::export::isolines;
+use ridgeway::grid::isolines;
 use ridgeway::render::{IsolineLayer, MapPicture, Rgb, RouteLayer};
 
 fn main() -> Result<(), Error> {

@@ -10,7 +10,7 @@ mod parametrisations;
 mod shapes;
 
 use glam::{DVec2, DVec3};
-use ridgeway::export::{isolines, levels_by_step};
+use ridgeway::grid::{isolines, levels_by_step};
 use ridgeway::render::{Gradient, Rgb, SurfacePicture, beside, png};
 use ridgeway::{Delta, GridFrame, Ground, Metric};
 

@@ -9,7 +9,7 @@
 mod output;
 
 use glam::DVec2;
-use ridgeway::export::isolines;
+use ridgeway::grid::isolines;
 use ridgeway::render::{IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::{
     Comparison, Control, Crs, Delta, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric,

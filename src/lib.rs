@@ -71,7 +71,7 @@ mod control;
 pub mod eikonal;
 pub mod error;
 pub mod export;
-mod grid;
+pub mod grid;
 pub mod linalg;
 pub mod metric;
 pub mod region;

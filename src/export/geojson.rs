@@ -4,10 +4,9 @@ use ::geojson::{Feature, FeatureCollection, GeometryValue, JsonObject, Position}
 use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
 
-use super::isolines::Isoline;
 use super::round;
 use crate::error::Result;
-use crate::grid::GridFrame;
+use crate::grid::{GridFrame, Isoline};
 use crate::region::Polygon;
 use crate::route::Route;
 use crate::terrain::Crs;

@@ -7,14 +7,12 @@ mod atomic;
 mod geojson;
 mod geotiff;
 mod gpx;
-mod isolines;
 mod profile;
 
 pub use self::atomic::{check_folder_free, check_free, write_file, write_folder};
 pub use self::geojson::{isolines_geojson, regions_geojson, routes_geojson};
 pub use self::geotiff::{Band, Samples, write_geotiff};
 pub use self::gpx::routes_gpx;
-pub use self::isolines::{Isoline, isolines, levels_by_step, round_step};
 pub use self::profile::write_profiles;
 
 /// `value` to so many decimals.

@@ -1,4 +1,4 @@
-//! A sheet of pixels with the few shapes that our pictures need.
+//! A raster of pixels and the few shapes that our pictures need.
 
 use glam::Vec2;
 use rayon::prelude::*;

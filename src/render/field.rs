@@ -4,13 +4,12 @@ use glam::DVec2;
 use tiny_skia::Pixmap;
 
 use super::canvas::{self, Rgb};
+use super::layout::{Item, MapLayout, SIDE};
 use super::relief::VOID;
-use super::sheet::{Item, SIDE, Sheet};
 use super::text::number;
 use crate::control::Control;
 use crate::error::{Error, Result};
-use crate::export::round_step;
-use crate::grid::GridFrame;
+use crate::grid::{GridFrame, round_step};
 
 /// Colours along the bar.
 const SHADES: usize = 256;
@@ -131,13 +130,13 @@ impl<'a> FieldPicture<'a> {
         if self.values.iter().any(|v| !v.is_finite()) {
             legend.push(Item::Patch { colour: None, label: "no value".into() });
         }
-        let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, legend)?;
-        sheet.ground(&self.control, |grid| {
+        let mut layout = MapLayout::new(self.frame, &self.title, self.max_side_px, legend)?;
+        layout.ground(&self.control, |grid| {
             let [low, high] = range?;
             let share = (self.value(grid)? - low) / (high - low);
             Some(self.gradient.colour(share))
         })?;
-        Ok(sheet.finish())
+        Ok(layout.finish())
     }
 
     /// [`render`](Self::render) as a PNG file.

@@ -4,14 +4,13 @@ use glam::{DVec2, Vec2};
 use tiny_skia::Pixmap;
 
 use super::canvas::{self, Rgb};
+use super::layout::{Item, MapLayout, SIDE};
 use super::regions::RegionLayer;
 use super::relief::Relief;
-use super::sheet::{Item, SIDE, Sheet};
 use super::text;
 use crate::control::Control;
 use crate::error::{Error, Result};
-use crate::export::Isoline;
-use crate::grid::GridFrame;
+use crate::grid::{GridFrame, Isoline};
 
 /// Every so many isolines one is thick and labelled.
 const MAJOR: usize = 5;
@@ -102,25 +101,25 @@ impl<'a> MapPicture<'a> {
                 self.barriers.len()
             )));
         }
-        let mut sheet = Sheet::new(self.frame, &self.title, self.max_side_px, self.legend())?;
-        self.draw_ground(&mut sheet)?;
+        let mut layout = MapLayout::new(self.frame, &self.title, self.max_side_px, self.legend())?;
+        self.draw_ground(&mut layout)?;
         if let Some(regions) = &self.regions {
-            regions.draw_borders(&mut sheet);
-            regions.draw_numbers(&mut sheet, |grid| self.node(grid));
+            regions.draw_borders(&mut layout);
+            regions.draw_numbers(&mut layout, |grid| self.node(grid));
         }
         let mut labels = Vec::new();
         for layer in &self.isolines {
-            labels.extend(draw_isolines(&mut sheet, layer));
+            labels.extend(draw_isolines(&mut layout, layer));
         }
         let on_top = self.routes.iter().flat_map(|r| r.grid).chain(&self.starts).chain(&self.goals);
-        let taken: Vec<_> = on_top.map(|&p| sheet.place(p)).collect();
-        draw_labels(&mut sheet, labels, &taken);
-        self.draw_routes(&mut sheet);
-        self.starts.iter().for_each(|&at| sheet.pin(at, "S", Rgb::GREEN));
+        let taken: Vec<_> = on_top.map(|&p| layout.place(p)).collect();
+        draw_labels(&mut layout, labels, &taken);
+        self.draw_routes(&mut layout);
+        self.starts.iter().for_each(|&at| layout.pin(at, "S", Rgb::GREEN));
         for (i, &at) in self.goals.iter().enumerate() {
-            sheet.pin(at, &self.goal_mark(i), Rgb::PURPLE);
+            layout.pin(at, &self.goal_mark(i), Rgb::PURPLE);
         }
-        Ok(sheet.finish())
+        Ok(layout.finish())
     }
 
     /// [`render`](Self::render) as a PNG file.
@@ -169,9 +168,9 @@ impl<'a> MapPicture<'a> {
         self.frame.index(node.x as usize, node.y as usize)
     }
 
-    fn draw_ground(&self, sheet: &mut Sheet) -> Result<()> {
+    fn draw_ground(&self, layout: &mut MapLayout) -> Result<()> {
         let relief = Relief::new(self.frame, self.heights, self.max_side_px as usize);
-        sheet.ground(&self.control, |grid| {
+        layout.ground(&self.control, |grid| {
             let colour = relief.at(grid)?;
             let node = self.node(grid);
             let barrier = self.barriers.get(node);
@@ -186,16 +185,16 @@ impl<'a> MapPicture<'a> {
         4.5 + 3.0 * (self.routes.len() - 1 - route).min(3) as f32
     }
 
-    fn draw_routes(&self, sheet: &mut Sheet) {
+    fn draw_routes(&self, layout: &mut MapLayout) {
         let lines: Vec<_> =
-            self.routes.iter().map(|route| sheet.lines(&[route.grid.to_vec()])).collect();
-        let widths: Vec<_> = (0..lines.len()).map(|i| self.route_width(i) * sheet.unit).collect();
-        let casing = 3.5 * sheet.unit;
+            self.routes.iter().map(|route| layout.lines(&[route.grid.to_vec()])).collect();
+        let widths: Vec<_> = (0..lines.len()).map(|i| self.route_width(i) * layout.unit).collect();
+        let casing = 3.5 * layout.unit;
         for (line, width) in lines.iter().zip(&widths) {
-            sheet.canvas.lines(line, width + casing, Rgb::WHITE, 0.9);
+            layout.canvas.lines(line, width + casing, Rgb::WHITE, 0.9);
         }
         for ((line, width), route) in lines.iter().zip(&widths).zip(&self.routes) {
-            sheet.canvas.lines(line, *width, route.colour, 1.0);
+            layout.canvas.lines(line, *width, route.colour, 1.0);
         }
     }
 }
@@ -209,19 +208,19 @@ struct Label {
 }
 
 /// Thin lines, every fifth thicker; and where along each thick one its label may go, best first.
-fn draw_isolines(sheet: &mut Sheet, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>> {
+fn draw_isolines(layout: &mut MapLayout, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>> {
     let mut labels = Vec::new();
     for (i, isoline) in layer.isolines.iter().enumerate() {
-        let lines = sheet.lines(&isoline.lines);
+        let lines = layout.lines(&isoline.lines);
         let major = (i + 1) % MAJOR == 0;
         let (width, opacity) = if major { (2.2, 0.8) } else { (1.1, 0.6) };
-        sheet.canvas.lines(&lines, width * sheet.unit, layer.colour, opacity);
+        layout.canvas.lines(&lines, width * layout.unit, layer.colour, opacity);
         if major && let Some(longest) = lines.iter().max_by_key(|line| line.len()) {
             labels.push(label_places(
                 longest,
                 &text::number(isoline.level),
                 layer.colour,
-                sheet.unit,
+                layout.unit,
             ));
         }
     }
@@ -239,21 +238,21 @@ fn label_places(line: &[Vec2], text: &str, colour: Rgb, unit: f32) -> Vec<Label>
 
 /// Draws each label in its first place that is on the map and free of `taken` points and of other
 /// labels; a label without such a place is left out.
-fn draw_labels(sheet: &mut Sheet, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
-    let size = LABEL * sheet.unit;
+fn draw_labels(layout: &mut MapLayout, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
+    let size = LABEL * layout.unit;
     let mut drawn: Vec<Label> = Vec::new();
     for places in labels {
         let free = |l: &Label| {
             let apart = |p: Vec2, reach: Vec2| (p - l.middle).abs().cmpgt(l.half + reach).any();
-            sheet.shows(l.middle - l.half)
-                && sheet.shows(l.middle + l.half)
-                && taken.iter().all(|&p| apart(p, Vec2::splat(10.0 * sheet.unit)))
+            layout.shows(l.middle - l.half)
+                && layout.shows(l.middle + l.half)
+                && taken.iter().all(|&p| apart(p, Vec2::splat(10.0 * layout.unit)))
                 && drawn.iter().all(|d| apart(d.middle, d.half))
         };
         if let Some(label) = places.into_iter().find(free) {
             let width = text::width(&label.text, size);
             let baseline = label.middle + Vec2::new(-width / 2.0, 0.36 * size);
-            sheet.canvas.text(&label.text, size, baseline, label.colour, 3.0 * sheet.unit);
+            layout.canvas.text(&label.text, size, baseline, label.colour, 3.0 * layout.unit);
             drawn.push(label);
         }
     }
@@ -299,9 +298,9 @@ mod tests {
         map.starts = vec![way[0]];
         map.goals = vec![way[1]];
         let picture = map.render().unwrap();
-        let sheet = Sheet::new(&frame, "", 1600, []).unwrap();
+        let layout = MapLayout::new(&frame, "", 1600, []).unwrap();
         let pixel = |grid: DVec2, off: f32| {
-            let at = sheet.place(grid);
+            let at = layout.place(grid);
             let p = picture.pixel(at.x as u32, (at.y + off) as u32).unwrap();
             Rgb(p.red(), p.green(), p.blue())
         };
@@ -312,7 +311,7 @@ mod tests {
         assert_eq!(pixel(DVec2::new(80.0, 10.0), 0.0), ground.mix(BARRIER, 0.5));
         // Twice as wide as tall, as on the ground.
         assert_eq!(
-            sheet.place(DVec2::new(99.5, 49.5)) - sheet.place(DVec2::splat(-0.5)),
+            layout.place(DVec2::new(99.5, 49.5)) - layout.place(DVec2::splat(-0.5)),
             Vec2::new(1600.0, 800.0)
         );
     }

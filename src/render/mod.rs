@@ -1,15 +1,15 @@
 //! Pictures: maps of routes, isolines and regions over shaded terrain, and fields in colour.
 //!
-//! A [`SurfacePicture`] shows a surface in space. Any other picture is a sheet: a title, the map in its true proportions on the ground, and below it the
-//! scale bar and the legend, which therefore never cover the map.
+//! A [`SurfacePicture`] shows a surface in space. A map is laid out below its title in its true
+//! proportions on the ground, above the scale bar and the legend, which therefore never cover it.
 
 mod canvas;
 mod field;
+mod layout;
 mod map;
 mod plot;
 mod regions;
 mod relief;
-mod sheet;
 mod surface;
 mod text;
 

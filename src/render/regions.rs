@@ -3,7 +3,7 @@
 use glam::{DVec2, Vec2};
 
 use super::canvas::{Canvas, Rgb};
-use super::sheet::Sheet;
+use super::layout::MapLayout;
 use super::text;
 use crate::region::Polygon;
 
@@ -46,31 +46,35 @@ impl RegionLayer<'_> {
         self.colours.get((*self.labels.get(node)?)? as usize).copied()
     }
 
-    pub(super) fn draw_borders(&self, sheet: &mut Sheet) {
+    pub(super) fn draw_borders(&self, layout: &mut MapLayout) {
         for (level, regions) in self.borders.iter().enumerate().rev() {
             let rings: Vec<_> = regions
                 .iter()
                 .flatten()
                 .flat_map(|polygon| polygon.holes.iter().chain([&polygon.exterior]).cloned())
                 .collect();
-            let lines = sheet.lines(&rings);
+            let lines = layout.lines(&rings);
             let width = if level + 1 == self.borders.len() { 1.2 } else { 3.0 };
-            sheet.canvas.lines(&lines, width * sheet.unit, Rgb::INK, 0.7);
+            layout.canvas.lines(&lines, width * layout.unit, Rgb::INK, 0.7);
         }
         for &seed in &self.seeds {
-            let at = sheet.place(seed);
-            let [radius, rim] = SEED.map(|size| size * sheet.unit);
-            sheet.canvas.disc(at, radius, rim, Rgb::INK);
+            let at = layout.place(seed);
+            let [radius, rim] = SEED.map(|size| size * layout.unit);
+            layout.canvas.disc(at, radius, rim, Rgb::INK);
         }
     }
 
     /// Writes the numbers beside the seeds; `node` is the one at grid coordinates.
-    pub(super) fn draw_numbers(&self, sheet: &mut Sheet, node: impl Fn(DVec2) -> usize + Sync) {
+    pub(super) fn draw_numbers(
+        &self,
+        layout: &mut MapLayout,
+        node: impl Fn(DVec2) -> usize + Sync,
+    ) {
         let label = |at: DVec2| self.labels.get(node(at)).copied().flatten();
-        let ([left, top, width, height], mut pixels) = sheet.sample(label);
-        let reach = SEED.iter().sum::<f32>() * sheet.unit;
+        let ([left, top, width, height], mut pixels) = layout.sample(label);
+        let reach = SEED.iter().sum::<f32>() * layout.unit;
         for &seed in &self.seeds {
-            let at = sheet.place(seed) - Vec2::new(left as f32, top as f32);
+            let at = layout.place(seed) - Vec2::new(left as f32, top as f32);
             let span = |at: f32, end: usize| {
                 (at - reach).max(0.0) as usize..end.min((at + reach) as usize + 1)
             };
@@ -79,7 +83,7 @@ impl RegionLayer<'_> {
                 pixels[y * width..][columns].fill(None);
             }
         }
-        draw_numbers(&mut sheet.canvas, &pixels, [left, top, width], NUMBER * sheet.unit);
+        draw_numbers(&mut layout.canvas, &pixels, [left, top, width], NUMBER * layout.unit);
     }
 }
 

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use tiny_skia::{Pixmap, PixmapPaint, Transform};
 
 use super::canvas::{self, Canvas, Rgb};
+use super::layout::{SIDE, SIDES};
 use super::regions::draw_numbers;
-use super::sheet::{SIDE, SIDES};
 use super::text;
 use crate::error::{Error, Result};
 use crate::surface::ParametricSurface;
@@ -155,14 +155,14 @@ impl std::fmt::Debug for SurfacePicture<'_> {
 pub fn beside(pictures: &[Pixmap]) -> Result<Pixmap> {
     let width = pictures.iter().map(Pixmap::width).sum();
     let height = pictures.iter().map(Pixmap::height).max().unwrap_or(0);
-    let mut sheet = Canvas::new(width, height)?.into_pixmap();
+    let mut all = Canvas::new(width, height)?.into_pixmap();
     let mut left = 0;
     for picture in pictures {
         let paint = PixmapPaint::default();
-        sheet.draw_pixmap(left, 0, picture.as_ref(), &paint, Transform::identity(), None);
+        all.draw_pixmap(left, 0, picture.as_ref(), &paint, Transform::identity(), None);
         left += picture.width() as i32;
     }
-    Ok(sheet)
+    Ok(all)
 }
 
 /// Who looks, and where the light is.

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use ridgeway::export::{Samples, isolines, isolines_geojson, levels_by_step, round_step};
+use ridgeway::export::{Samples, isolines_geojson};
+use ridgeway::grid::{isolines, levels_by_step, round_step};
 use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Stop};
 use serde_json::{Value, json};
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ridgeway::export::{Isoline, isolines, levels_by_step, round_step};
+use ridgeway::grid::{Isoline, isolines, levels_by_step, round_step};
 use ridgeway::render::{FieldPicture, Gradient, IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::route::trace;
 use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Route, Stop};

@@ -8,8 +8,8 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::GridFrame;
 use crate::error::{Error, Result};
-use crate::grid::GridFrame;
 
 /// The lines on which a field has one value.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,8 +9,7 @@ use super::relief::VOID;
 use super::text;
 use crate::control::Control;
 use crate::error::{Error, Result};
-use crate::export::round_step;
-use crate::grid::GridFrame;
+use crate::grid::{GridFrame, round_step};
 
 /// Pixels of the map's longer side unless told otherwise.
 pub(super) const SIDE: u32 = 1600;
@@ -42,7 +41,7 @@ pub(super) enum Item {
     Bar { colours: Vec<Rgb>, ticks: Vec<(f64, String)>, label: String },
 }
 
-pub(super) struct Sheet {
+pub(super) struct MapLayout {
     pub(super) canvas: Canvas,
     /// Corner and size of the map in pixels.
     map: [usize; 4],
@@ -52,8 +51,8 @@ pub(super) struct Sheet {
     pub(super) unit: f32,
 }
 
-impl Sheet {
-    /// A sheet for `frame` whose map has `side` pixels on its longer side, with the footer drawn.
+impl MapLayout {
+    /// A layout for `frame` whose map has `side` pixels on its longer side, with the footer drawn.
     pub(super) fn new(
         frame: &GridFrame,
         title: &str,
