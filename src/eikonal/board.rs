@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use super::field::{AREA, SIDE, Tiling};
+use super::tile::{Block, Limits};
 use super::tiles::Values;
-use super::update::{Block, Limits};
 
 /// Values at the nodes as the bits of `f32`, tile by tile.
 ///

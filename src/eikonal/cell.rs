@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::DistanceMap;
 use super::source::sees;
-use super::update::segment;
+use super::stencil::segment::segment;
 
 impl DistanceMap {
     /// The best point on the border of the cells around `at`: the solver's update with `at` as the node. `None` if the

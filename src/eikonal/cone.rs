@@ -19,8 +19,9 @@ use rayon::prelude::*;
 
 use super::field::{SIDE, TensorField, TensorTile, Tiling};
 use super::source::{POINT_RADIUS, StartRegion};
-use super::update::{RING, choose, greatest, lanes, least};
+use super::stencil::ring::RING;
 use crate::linalg::Sym2;
+use crate::linalg::lanes::{choose, greatest, lanes, least};
 
 /// Radius of the region around a point where the cone is taken out, as a share of the grid's longer side: fixed in
 /// metres, not in cells, or first order would keep its logarithm. In a prototype at n = 1001 .05, .1, .2, .4 gave a ratio of 400

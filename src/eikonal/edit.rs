@@ -2,7 +2,7 @@
 //!
 //! A node's value is still true if it is *supported*: if the update from its ring gives no more. So the nodes that
 //! changed are forgotten, then all that are no longer supported, in the order in which news travel, until none is left
-//! ([`Rule::Forget`](super::update::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
+//! ([`Rule::Forget`](super::tile::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
 //! step than anything its ring offers. What is left is true or too high, so that the ordinary solve, going on from
 //! the nodes that were forgotten, ends where one from the beginning would.
 
@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use super::field::{AREA, TensorTile};
 use super::sides::neighbours;
 use super::source::{self, Seeds};
+use super::stencil::UNREACHED;
 use super::tiles::{self, Equation, News, Solution, Statistics, Values};
-use super::update::UNREACHED;
 use super::{Cones, DistanceMap, Solver, Stop, TensorField};
 use crate::control::Control;
 use crate::error::Result;
@@ -166,7 +166,7 @@ fn moved_seeds<'a>(
 
 /// The tiles in and beside which a start is passed over by a quicker way, with how many nodes of each have a value.
 ///
-/// Such a node jumps down from its own value, see [`ceiling`](super::update::ceiling). On obtuse metrics it may then hold up the very nodes
+/// Such a node jumps down from its own value, see [`ceiling`](super::tile::coefficients::ceiling). On obtuse metrics it may then hold up the very nodes
 /// that brought it down, so that what it came from must not be taken away alone.
 fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize)> {
     let is_contested = |tile: &usize| {

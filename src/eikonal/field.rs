@@ -56,6 +56,12 @@ impl Tiling {
         self.across * self.down
     }
 
+    /// Whether a tile is its own neighbour along x and along y.
+    pub(crate) fn is_ring(&self) -> [bool; 2] {
+        let [across, down] = self.periodic;
+        [across && self.across == 1, down && self.down == 1]
+    }
+
     /// The first node of a tile.
     pub(crate) fn first(&self, tile: usize) -> DVec2 {
         DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64

@@ -1,7 +1,7 @@
 //! Which start region each node belongs to.
 
 use super::origin::origins;
-use super::update::RING;
+use super::stencil::ring::RING;
 use super::{DistanceMap, SLACK, source};
 
 /// Not looked at yet.

@@ -1,7 +1,7 @@
 //! Distances: `√(∇gᵀ D ∇g) = 1`, `g = 0` on the start region.
 //!
 //! [`Solver::solve`] discretises the equation by the semi-Lagrangian update on the eight triangles around a node
-//! (`update.rs`) and iterates it to a standstill tile by tile in order of distance (`tiles.rs`). First order
+//! (`stencil/`) and iterates it to a standstill tile by tile in order of distance (`tiles.rs`). First order
 //! in the spacing, also near the start, where the cone of a point is taken out (`cone.rs`); second order by deferred
 //! correction if asked for ([`Accuracy`], `correction/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
 //! ns of one core and 16 bytes per node, at high accuracy 80 to 150 ns and 24 bytes. [`mod@reference`] is the slow
@@ -16,15 +16,15 @@ mod crew;
 mod edit;
 mod field;
 mod labels;
-mod mirror;
 mod origin;
 mod queue;
 pub mod reference;
 mod sides;
 mod source;
+mod stencil;
 mod stop;
+mod tile;
 mod tiles;
-mod update;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -37,10 +37,13 @@ use self::field::{AREA, TensorTile};
 use self::source::Seeds;
 pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
+use self::stencil::UNREACHED;
+use self::stencil::ring::RING;
+use self::stencil::segment::segment;
 pub use self::stop::Stop;
+use self::tile::Limits;
 pub use self::tiles::Statistics;
 use self::tiles::{Equation, News, Solution, Values};
-use self::update::{Limits, RING, UNREACHED, segment};
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;

@@ -8,16 +8,18 @@ use rayon::prelude::*;
 use super::board::Board;
 use super::cone::Cones;
 use super::field::{SIDE, TensorField};
+use super::stencil::UNREACHED;
+use super::stencil::ring::pass;
+use super::tile::coefficients::{Coefficients, LaneLimits, prepare, prepare_shifts, tensors};
+use super::tile::kernel::{How, triangle};
+use super::tile::{Block, Tile};
 use super::tiles::Values;
-use super::update::{
-    Block, Coefficients, How, LaneLimits, Tile, UNREACHED, lanes, least, pass, prepare,
-    prepare_shifts, tensors, triangle,
-};
+use crate::linalg::lanes::{lanes, least};
 
 /// No place on the ring.
 pub(super) const NOWHERE: u8 = u8::MAX;
 
-/// Of each node, row-major, the place on its [`RING`](super::update::RING) that leads home: of the two ends of the segment that
+/// Of each node, row-major, the place on its [`RING`](super::stencil::ring::RING) that leads home: of the two ends of the segment that
 /// its value came from, the one nearer to the point it came from; the other, if only that is lower than the node. [`NOWHERE`]
 /// where not reached. Beside a cone taken out both may be higher; the nearer one still leads there.
 pub(super) fn origins(field: &TensorField, cones: &Cones, values: Values) -> Vec<u8> {
@@ -133,7 +135,7 @@ fn of_line<const IN_CONE: bool>(block: &Block, tile: &Tile<'_>, row: usize) -> [
 mod tests {
     use glam::DVec2;
 
-    use super::super::update::RING;
+    use super::super::stencil::ring::RING;
     use super::*;
     use crate::control::Control;
     use crate::eikonal::{Solver, Stop};

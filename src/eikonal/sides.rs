@@ -1,7 +1,6 @@
 //! How tiles lie beside each other.
 
 use super::field::{Tiling, wrap};
-use super::update::{ALL, Lines};
 
 /// Where news of a tile come from, as (tiles east, tiles south): its neighbours, and itself.
 pub(super) const SIDES: [(isize, isize); 9] =
@@ -37,17 +36,5 @@ pub(super) fn neighbours(tiling: &Tiling, tile: usize) -> impl Iterator<Item = (
         let x = wrap(x as isize + dx, across, periodic[0])?;
         let y = wrap(y as isize + dy, down, periodic[1])?;
         Some((side, y * across + x))
-    })
-}
-
-/// The rows and the columns of a tile of a size next to the given sides, one bit each. A corner is in the row.
-pub(super) fn lines_beside(sides: u16, [width, height]: [usize; 2]) -> [Lines; 2] {
-    let line = |at: isize, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
-    (0..SIDES.len()).filter(|side| sides & 1 << side != 0).fold([0; 2], |[rows, cols], side| {
-        match SIDES[side] {
-            (0, 0) => [ALL, cols],
-            (dx, 0) => [rows, cols | line(dx, width)],
-            (_, dy) => [rows | line(dy, height), cols],
-        }
     })
 }

@@ -6,7 +6,8 @@ use glam::DVec2;
 
 use super::cone::Cone;
 use super::field::{AREA, TensorField, Tiling};
-use super::update::{UNREACHED, segment};
+use super::stencil::UNREACHED;
+use super::stencil::segment::segment;
 use crate::error::{Error, Result};
 use crate::linalg::Sym2;
 

@@ -4,8 +4,9 @@ use glam::DVec2;
 
 use super::board::{Board, LimitsBoard};
 use super::field::{AREA, TensorField};
+use super::stencil::UNREACHED;
+use super::tile::Limits;
 use super::tiles::Values;
-use super::update::{Limits, UNREACHED};
 use crate::error::{Error, Result};
 
 /// When to stop. Whatever the rule, what a map reports is final: the same as without it, but for the tolerance. All else is

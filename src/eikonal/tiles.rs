@@ -15,10 +15,12 @@ use super::cone::Cones;
 use super::crew;
 use super::field::{AREA, SIDE, TensorField, TensorTile, Tiling};
 use super::queue::{Job, Queue};
-use super::sides::{ITSELF, NEIGHBOURS, SIDES, lines_beside, neighbour, neighbours, opposite};
+use super::sides::{ITSELF, SIDES, neighbours, opposite};
 use super::source::Seeds;
+use super::stencil::UNREACHED;
 use super::stop::{self, Standing, Stop};
-use super::update::{Bench, Block, Limits, ROUNDING, Rule, Tile, UNREACHED, choose, lanes, least};
+use super::tile::kernel::{self, Problem, Workspace};
+use super::tile::{Limits, Rule, Tile};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -100,9 +102,6 @@ struct Outcome {
 }
 
 impl Outcome {
-    const NOTHING: Self =
-        Self { wakes: [f32::INFINITY; 8], unsettled: f32::INFINITY, slack: 0.0, sweeps: 0 };
-
     fn to_bits(self) -> [u32; 11] {
         let [e, se, s, sw, w, nw, n, ne] = self.wakes.map(f32::to_bits);
         [e, se, s, sw, w, nw, n, ne, self.unsettled.to_bits(), self.slack.to_bits(), self.sweeps]
@@ -117,9 +116,6 @@ impl Outcome {
         }
     }
 }
-
-/// Sweeps of a tile before it goes back into the queue.
-const MAX_SWEEPS: u32 = 16;
 
 /// Activations of a tile after which a solve is given up, without and with cones. Tiles of fields that settle took at
 /// most 34 at ratio 400, 86 at 2500, 19 on rough isotropic ones.
@@ -307,14 +303,14 @@ pub(super) fn relax(
     let mut settles = true;
     let mut statistics = Statistics::default();
     let shared = &*shared;
-    let work = |bench: &mut Bench, job: u64| {
+    let work = |workspace: &mut Workspace, job: u64| {
         let job = Job::from_bits(job);
         let tile = job.tile as usize;
         let first = tiling.first(tile);
         let cone = cones.of_tile(tile).map(|cone| (cone, first));
         let input =
             Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
-        solve_tile(bench, &tiling, &input, rule, shared, job).to_bits()
+        solve_tile(workspace, &tiling, &input, rule, shared, job).to_bits()
     };
     let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 11]]| -> Result<()> {
         for (job, &outcome) in jobs.drain(..).zip(outcomes) {
@@ -400,131 +396,39 @@ fn settle(tiling: &Tiling, queue: &mut Queue, tile: usize, outcome: &Outcome) {
     }
 }
 
-/// Sweeps a tile until it stands still: in the direction of the news and back, then across it and back.
+/// Solves the tile of a job: from the shared values to the shared values.
 fn solve_tile(
-    bench: &mut Bench,
+    workspace: &mut Workspace,
     tiling: &Tiling,
     input: &Tile<'_>,
     rule: Rule,
-    shared: &Shared,
+    Shared { board, limits }: &Shared,
     job: Job,
 ) -> Outcome {
     let tile = job.tile as usize;
-    shared.board.load(tile, bench.clear());
-    // Sweeps run away from the news.
-    let (dx, dy) = SIDES[job.first as usize];
-    let mut descending = [dy > 0, dx > 0];
-    let mut by_columns = dx != 0 && dy == 0;
-    // Rows and columns owed to news from outside, and those owed to changes inside, which either pays off.
-    let size = tiling.size(tile);
-    let mut owed = lines_beside(job.sides, size);
-    let mut changes = [0; 2];
-    let mut changed = false;
-    let mut outcome = Outcome::NOTHING;
-    while outcome.sweeps < MAX_SWEEPS && (owed, changes) != ([0; 2], [0; 2]) {
-        let side = usize::from(by_columns);
-        let dirty = owed[side] | changes[side];
-        if dirty != 0 {
-            changes = bench.sweep(input, rule, by_columns, descending[side], dirty);
-            owed[side] = 0;
-            outcome.sweeps += 1;
-            changed |= changes != [0; 2];
-            descending[side] = !descending[side];
-        }
-        by_columns ^= dirty == 0 || owed[1 - side] != 0 || outcome.sweeps.is_multiple_of(2);
+    board.load(tile, workspace.values());
+    let mut slacks = [0.0; 8];
+    for (side, n) in neighbours(tiling, tile) {
+        slacks[side] = limits.at(n).slack;
     }
-    let limits = bench.limits();
-    shared.limits.raise(tile, &limits);
-    outcome.slack = limits.slack;
-    if changed {
-        let block = bench.values();
-        let settled = (owed, changes) == ([0; 2], [0; 2]);
-        if !settled {
-            outcome.unsettled = block[1..=SIDE]
-                .iter()
-                .flat_map(|line| &line[1..=SIDE])
-                .fold(f32::INFINITY, |least, &value| least.min(value));
-        }
-        outcome.wakes = wakes(tiling, shared, (tile, size), &limits, block);
-        shared.board.store(tile, block);
+    let problem = Problem {
+        tile: *input,
+        rule,
+        size: tiling.size(tile),
+        changed: job.sides,
+        first: job.first,
+        slacks,
+        is_ring: tiling.is_ring(),
+    };
+    let solved = kernel::solve(workspace, &problem);
+    limits.raise(tile, &solved.limits);
+    if solved.is_changed {
+        board.store(tile, workspace.values());
     }
-    outcome
-}
-
-/// The least changed values that could improve, or supported, a neighbour. A node `x` can be improved by a neighbour `y`
-/// only if `g(y) < g(x) + slack`.
-fn wakes(
-    tiling: &Tiling,
-    shared: &Shared,
-    (tile, [cols, rows]): (usize, [usize; 2]),
-    limits: &Limits,
-    block: &Block,
-) -> [f32; 8] {
-    let (east, south) = (cols - 1, rows - 1);
-    let old = |col: usize, row: usize| shared.board.at(tile, row * SIDE + col);
-    let slack = |k: usize| {
-        let (dx, dy) = NEIGHBOURS[k];
-        let Some(n) = neighbour(tiling, tile, dx, dy) else { return 0.0 };
-        let slack = shared.limits.at(n).slack;
-        // A periodic direction may be one tile wide.
-        if n == tile { slack.max(limits.slack) } else { slack }
-    };
-    let across = |k: usize, row: usize, beside: usize| {
-        let line = |row: usize| lanes(&block[row], 1);
-        let old = std::array::from_fn(|col| old(col, row));
-        least_news(cols, old, line(row + 1), line(beside), slack(k))
-    };
-    let down = |k: usize, col: usize, beside: usize| {
-        let line = |col: usize| std::array::from_fn(|row| block[row + 1][col]);
-        let old = std::array::from_fn(|row| old(col, row));
-        least_news(rows, old, line(col + 1), line(beside), slack(k))
-    };
-    let corner = |k: usize, col: usize, row: usize| {
-        let (dx, dy) = NEIGHBOURS[k];
-        let beside = block[(row + 1).wrapping_add_signed(dy)][(col + 1).wrapping_add_signed(dx)];
-        improves(news(old(col, row), block[row + 1][col + 1]), beside, slack(k))
-    };
-    [
-        down(0, east, east + 2),
-        corner(1, east, south),
-        across(2, south, south + 2),
-        corner(3, 0, south),
-        down(4, 0, 0),
-        corner(5, 0, 0),
-        across(6, 0, 0),
-        corner(7, east, 0),
-    ]
-}
-
-/// The least of the news of the first `count` nodes of a line that could improve the line `beside` it.
-fn least_news(
-    count: usize,
-    old: [f32; SIDE],
-    new: [f32; SIDE],
-    beside: [f32; SIDE],
-    slack: f32,
-) -> f32 {
-    // With one place before and after.
-    let mut padded = [f32::INFINITY; SIDE + 2];
-    for i in 0..SIDE {
-        padded[i + 1] = choose(i < count, news(old[i], new[i]), f32::INFINITY);
+    Outcome {
+        wakes: solved.changes,
+        unsettled: solved.unconverged,
+        slack: solved.limits.slack,
+        sweeps: solved.sweeps,
     }
-    let mut keys = [f32::INFINITY; SIDE];
-    for i in 0..SIDE {
-        let news = least(least(padded[i], padded[i + 1]), padded[i + 2]);
-        keys[i] = choose(i < count, improves(news, beside[i], slack), f32::INFINITY);
-    }
-    keys.into_iter().fold(f32::INFINITY, least)
-}
-
-/// The value that is news where it changed; infinite where it did not.
-#[inline(always)]
-fn news(old: f32, new: f32) -> f32 {
-    choose((old - new).abs() > ROUNDING * new, least(old, new), f32::INFINITY)
-}
-
-/// The news, if they could improve a value.
-#[inline(always)]
-fn improves(news: f32, value: f32, slack: f32) -> f32 {
-    choose((value <= UNREACHED) & (news < value + slack), news, f32::INFINITY)
 }

@@ -5,12 +5,17 @@
 use multiversion::multiversion;
 
 use super::super::field::{AREA, SIDE};
-use super::super::mirror::mirror;
-use super::super::update::{How, LaneLimits, RING, Tile, UNREACHED, lanes, prepare_shifts};
+use super::super::stencil::UNREACHED;
+use super::super::stencil::ring::RING;
+use super::super::tile::Tile;
+use super::super::tile::coefficients::{LaneLimits, prepare_shifts};
+use super::super::tile::kernel::How;
+use super::super::tile::transpose::mirror;
 use super::FirstOrder;
 use super::functional::{ConeAt, Foot};
 use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
 use super::triangle::{Triangle, choose};
+use crate::linalg::lanes::lanes;
 
 /// Where the values of a tile's nodes come from, and what the functional of second order adds there; by rows or, where
 /// `by_columns`, by columns.

@@ -2,8 +2,8 @@
 //!
 //! All triangles are mirrored onto one: with the axis neighbour `a` at (1, 0) and the diagonal one `b` at (1, 1).
 
-use super::super::update::{greatest, least};
 use super::triangle::choose;
+use crate::linalg::lanes::{greatest, least};
 
 /// `vᵀMv` for `v = (1, θ)`: `α + 2βθ + γθ²`, that is `M` as xx, xy, yy.
 #[derive(Clone, Copy)]

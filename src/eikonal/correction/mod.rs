@@ -33,10 +33,12 @@ use self::patch::Patch;
 use super::cone::Cones;
 use super::field::{AREA, TensorField};
 use super::source::Seeds;
+use super::stencil::UNREACHED;
+use super::tile::changes::ROUNDING;
 use super::tiles::Values;
-use super::update::{ROUNDING, UNREACHED, greatest};
 use crate::control::Control;
 use crate::error::Result;
+use crate::linalg::lanes::greatest;
 
 /// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first
 /// leaves undone the second sees. In a prototype the first round left .3 to 7 % of the first-order error, the

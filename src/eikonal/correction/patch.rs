@@ -4,13 +4,14 @@ use rayon::prelude::*;
 
 use super::super::field::{AREA, SIDE, Tiling};
 use super::super::sides::neighbours;
-use super::super::update::{UNREACHED, least};
+use super::super::stencil::UNREACHED;
 use super::FirstOrder;
 use super::feet::{Feet, Input, Surroundings};
 use super::strip::STRIP;
 use super::transport::carry;
 use crate::control::Control;
 use crate::error::Result;
+use crate::linalg::lanes::least;
 
 /// Tiles, in strips of [`STRIP`] side by side, with their feet. Grows where the correction is carried beyond.
 pub(super) struct Patch<'a> {
@@ -27,7 +28,7 @@ struct FeetOfStrip {
     first: usize,
     tiles: usize,
     feet: [Feet; STRIP],
-    /// The neighbours that each tile reads, one bit each as in [`RING`](super::super::update::RING).
+    /// The neighbours that each tile reads, one bit each as in [`RING`](super::super::stencil::ring::RING).
     reads: [u8; STRIP],
     /// In how many rounds they were found.
     rounds: usize,

@@ -2,7 +2,8 @@
 
 use super::super::field::{AREA, SIDE, Tiling};
 use super::super::sides::neighbour;
-use super::super::update::{RING, lanes};
+use super::super::stencil::ring::RING;
+use crate::linalg::lanes::lanes;
 
 /// A value of each node of a row of a tile.
 pub(super) type Lanes = [f32; SIDE];

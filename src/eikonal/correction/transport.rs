@@ -7,16 +7,17 @@ use multiversion::multiversion;
 use super::super::board::Board;
 use super::super::crew;
 use super::super::field::{AREA, SIDE, Tiling};
-use super::super::mirror::mirror_block;
 use super::super::queue::{Job, Queue};
 use super::super::sides::{ITSELF, neighbours, opposite};
+use super::super::tile::transpose::mirror_block;
+use super::super::tile::{ALL, Block, Lines};
 use super::super::tiles::{Values, WINDOW_CELLS};
-use super::super::update::{ALL, Block, Lines, choose, lanes};
 use super::feet::{self, BEFORE, BEHIND, Feet, Line};
 use super::patch::Patch;
 use super::triangle::Triangle;
 use crate::control::Control;
 use crate::error::Result;
+use crate::linalg::lanes::{choose, lanes};
 
 /// Sweeps over a tile before it goes back into the queue, and times it may come back.
 const MOST_SWEEPS: usize = 40;
@@ -26,7 +27,7 @@ const MOST_ACTIVATIONS: u32 = 40;
 #[derive(Clone, Copy)]
 struct Outcome {
     settled: bool,
-    /// The neighbours beside which something changed, one bit each as in [`RING`](super::super::update::RING).
+    /// The neighbours beside which something changed, one bit each as in [`RING`](super::super::stencil::ring::RING).
     changed: u8,
 }
 

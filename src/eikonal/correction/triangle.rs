@@ -1,7 +1,8 @@
 //! The eight triangles around a node, mirrored onto one.
 
-use super::super::update::{greatest, least, pass};
+use super::super::stencil::ring::pass;
 use super::functional::{Quadratic, inverse_root};
+use crate::linalg::lanes::{greatest, least};
 
 /// Yes or no, as the bits of a lane: all set or none.
 ///
@@ -88,7 +89,7 @@ impl Triangle {
         along_y.choose(negative.choose(north, south), negative.choose(west, east))
     }
 
-    /// Of the values around the node in the order of [`RING`](super::super::update::RING) that at `a`.
+    /// Of the values around the node in the order of [`RING`](super::super::stencil::ring::RING) that at `a`.
     #[inline(always)]
     pub(super) fn axis(self, ring: [f32; 8]) -> f32 {
         self.side(ring[0], ring[2], ring[4], ring[6])
@@ -118,7 +119,7 @@ impl Triangle {
 
     /// The triangle that gives a node its first-order value, as bits, and the difference `g(b) − g(a)` there, from the
     /// values around the node and `M` with its determinant. See
-    /// [`Coefficients`](super::super::update::Coefficients), there in terms of `D`. Roots to five digits: of two triangles
+    /// [`Coefficients`](super::super::tile::coefficients::Coefficients), there in terms of `D`. Roots to five digits: of two triangles
     /// that are as good as each other either will do.
     #[inline(always)]
     pub(super) fn best(ring: [f32; 8], [xx, xy, yy]: [f32; 3], det: f32) -> (u32, f32) {

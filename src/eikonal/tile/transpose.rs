@@ -2,14 +2,14 @@
 
 use glam::{Mat4, Vec4};
 
-use super::field::SIDE;
-use super::update::{BLOCK, Block};
+use super::{BLOCK, Block};
+use crate::eikonal::field::SIDE;
 
 /// Side of the squares that are mirrored in registers: number by number takes three times as long.
 const SQUARE: usize = 4;
 
 /// Mirrors a tile and the nodes around it.
-pub(super) fn mirror_block(block: &mut Block) {
+pub(crate) fn mirror_block(block: &mut Block) {
     const LAST: usize = BLOCK - 1;
     mirror(&mut block[1..LAST], 1);
     for i in 1..BLOCK {
@@ -27,7 +27,7 @@ fn swap(block: &mut Block, row: usize, col: usize) {
 }
 
 /// Mirrors a tile, the nodes of which begin at place `first` of the lines.
-pub(super) fn mirror<const N: usize>(lines: &mut [[f32; N]], first: usize) {
+pub(crate) fn mirror<const N: usize>(lines: &mut [[f32; N]], first: usize) {
     for row in (0..SIDE).step_by(SQUARE) {
         for col in (0..=row).step_by(SQUARE) {
             let (here, there) = (square(lines, row, first + col), square(lines, col, first + row));

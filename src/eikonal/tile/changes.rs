@@ -1,0 +1,97 @@
+//! What a neighbouring tile can gain from the changes in a tile.
+
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
+
+use std::array::from_fn;
+
+use super::{ALL, Block, Lines};
+use crate::eikonal::field::SIDE;
+use crate::eikonal::stencil::UNREACHED;
+use crate::eikonal::stencil::ring::RING;
+use crate::linalg::lanes::{choose, lanes, least};
+
+/// Four units in the last place of an `f32`: changes below are rounding.
+pub(crate) const ROUNDING: f32 = 2.4e-7;
+
+/// The rows and the columns of a tile of a size next to neighbours in a set, one bit each in the order of [`RING`]; a corner is in
+/// the row. Bit 8 is the tile itself: all rows.
+pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [Lines; 2] {
+    let line = |at: i32, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
+    let itself = if sides & 1 << RING.len() != 0 { ALL } else { 0 };
+    let beside = (0..RING.len()).filter(|side| sides & 1 << side != 0);
+    beside.fold([itself, 0], |[by_rows, by_cols], side| match RING[side] {
+        (dx, 0) => [by_rows, by_cols | line(dx, cols)],
+        (_, dy) => [by_rows | line(dy, rows), by_cols],
+    })
+}
+
+/// For each neighbour, in the order of [`RING`], the least value among the changes in a tile of a size that could improve it, or
+/// supported it; infinite if none. `slacks` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
+/// `g(y) < g(x) + slack`.
+pub(super) fn for_neighbours(
+    before: &Block,
+    after: &Block,
+    [cols, rows]: [usize; 2],
+    slacks: [f32; 8],
+) -> [f32; 8] {
+    let across = |side: usize, row: usize| {
+        let beside = row.wrapping_add_signed(RING[side].1 as isize);
+        let [old, new, beside] =
+            [&before[row], &after[row], &after[beside]].map(|line| lanes(line, 1));
+        least_change(cols, old, new, beside, slacks[side])
+    };
+    let down = |side: usize, col: usize| {
+        let line = |block: &Block, col: usize| from_fn(|row| block[row + 1][col]);
+        let beside = line(after, col.wrapping_add_signed(RING[side].0 as isize));
+        least_change(rows, line(before, col), line(after, col), beside, slacks[side])
+    };
+    let corner = |side: usize, col: usize, row: usize| {
+        let (dx, dy) = RING[side];
+        let beside =
+            after[row.wrapping_add_signed(dy as isize)][col.wrapping_add_signed(dx as isize)];
+        improving(change(before[row][col], after[row][col]), beside, slacks[side])
+    };
+    [
+        down(0, cols),
+        corner(1, cols, rows),
+        across(2, rows),
+        corner(3, 1, rows),
+        down(4, 1),
+        corner(5, 1, 1),
+        across(6, 1),
+        corner(7, cols, 1),
+    ]
+}
+
+/// The least of the changes in the first `count` nodes of a line that could improve the line `beside` it.
+fn least_change(
+    count: usize,
+    old: [f32; SIDE],
+    new: [f32; SIDE],
+    beside: [f32; SIDE],
+    slack: f32,
+) -> f32 {
+    // With one place before and after.
+    let mut padded = [f32::INFINITY; SIDE + 2];
+    for i in 0..SIDE {
+        padded[i + 1] = choose(i < count, change(old[i], new[i]), f32::INFINITY);
+    }
+    let mut found = [f32::INFINITY; SIDE];
+    for i in 0..SIDE {
+        let change = least(least(padded[i], padded[i + 1]), padded[i + 2]);
+        found[i] = choose(i < count, improving(change, beside[i], slack), f32::INFINITY);
+    }
+    found.into_iter().fold(f32::INFINITY, least)
+}
+
+/// The value that matters where a node changed; infinite where it did not.
+#[inline(always)]
+fn change(old: f32, new: f32) -> f32 {
+    choose((old - new).abs() > ROUNDING * new, least(old, new), f32::INFINITY)
+}
+
+/// The change, if it could improve a value.
+#[inline(always)]
+fn improving(change: f32, value: f32, slack: f32) -> f32 {
+    choose((value <= UNREACHED) & (change < value + slack), change, f32::INFINITY)
+}
