@@ -33,6 +33,7 @@ const KNOWN_CIRCLES: &[&str] = &[
     "cli",
     "eikonal",
     "eikonal/correction",
+    "eikonal/tile",
     "metric",
     "route",
     "surface",
