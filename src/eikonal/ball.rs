@@ -14,9 +14,9 @@ use super::queue::Job;
 use super::sides::neighbours;
 use super::source::{self, Seeds};
 use super::stop::is_final;
-use super::tile::Rule;
+use super::tile::kernel::Rule;
 use super::tiles::{self, Desk, End, Equation, Shared};
-use super::{Cones, Solver, StartRegion, Stop, unsettled};
+use super::{Factors, Solver, StartRegion, Stop, unsettled};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -68,11 +68,11 @@ impl<'a> Balls<'a> {
         let mut news = 0.0;
         if self.field.is_open(col, row) {
             let start = [DVec2::new(col as f64, row as f64).into()];
-            let cones = Cones::within(self.field, &start, largest.into());
-            let mut end = self.solve(&start, &cones, &stop, control)?;
-            if !end.settles && !cones.is_empty() {
+            let factors = Factors::within(self.field, &start, largest.into());
+            let mut end = self.solve(&start, &factors, &stop, control)?;
+            if !end.settles && !factors.is_empty() {
                 self.clear();
-                end = self.solve(&start, &Cones::default(), &stop, control)?;
+                end = self.solve(&start, &Factors::default(), &stop, control)?;
             }
             if !end.settles {
                 return Err(unsettled());
@@ -85,13 +85,13 @@ impl<'a> Balls<'a> {
     fn solve(
         &mut self,
         start: &[StartRegion],
-        cones: &Cones,
+        factors: &Factors,
         stop: &Stop,
         control: &Control,
     ) -> Result<End> {
         let Self { field, tolerance, desk, seeds, seeded, opened, is_open } = self;
         *seeded = source::add_seeds(field, start, seeds)?;
-        let equation = Equation { field, cones, seeds, tolerance: *tolerance };
+        let equation = Equation { field, factors, seeds, tolerance: *tolerance };
         for &tile in &*seeded {
             seeds[tile].iter().for_each(|seeds| desk.wake(&field.tiling, tile, seeds));
         }

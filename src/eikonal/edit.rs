@@ -2,7 +2,7 @@
 //!
 //! A node's value is still true if it is *supported*: if the update from its ring gives no more. So the nodes that
 //! changed are forgotten, then all that are no longer supported, in the order in which news travel, until none is left
-//! ([`Rule::Forget`](super::tile::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
+//! ([`Rule::Forget`](super::tile::kernel::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
 //! step than anything its ring offers. What is left is true or too high, so that the ordinary solve, going on from
 //! the nodes that were forgotten, ends where one from the beginning would.
 
@@ -13,7 +13,7 @@ use super::sides::neighbours;
 use super::source::{self, Seeds};
 use super::stencil::UNREACHED;
 use super::tiles::{self, Equation, News, Solution, Statistics, Values};
-use super::{Cones, DistanceMap, Solver, Stop, TensorField};
+use super::{DistanceMap, Factors, Solver, Stop, TensorField};
 use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::Sym2;
@@ -99,7 +99,7 @@ impl Solver {
         let mut changed = edit(&mut map.field)?;
         let seeds = source::seeds(&map.field, &map.starts)?;
         changed.extend(moved_seeds(&before, &seeds));
-        if Cones::new(&map.field, &map.starts) != map.cones {
+        if Factors::new(&map.field, &map.starts) != map.factors {
             return self.solve_again(map, stop, control);
         }
         let contested = contested(&map.values, &before);
@@ -107,7 +107,7 @@ impl Solver {
         let lost = clear(&mut map, &changed);
         let equation = Equation {
             field: &map.field,
-            cones: &map.cones,
+            factors: &map.factors,
             seeds: &seeds,
             tolerance: self.tolerance,
         };

@@ -3,19 +3,21 @@
 use std::ops::Range;
 
 use glam::DVec2;
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::linalg::Sym2;
+use crate::linalg::bilinear::{CORNERS, corner_weights};
+use crate::linalg::lanes::LANES;
+use crate::linalg::simd::{self, Kernel};
 use crate::metric::MetricField;
 use crate::metric::SpeedBlock;
 use crate::surface::BLOCK;
 
 /// Side of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
 /// needs more activations, the longer more sweeps; design measurements at ratio 1 to 400).
-pub(crate) const SIDE: usize = 16;
+pub(crate) const SIDE: usize = LANES;
 const _: () = assert!(SIDE == BLOCK, "a tile is filled from one block of speeds");
 /// Nodes of a tile.
 pub(crate) const AREA: usize = SIDE * SIDE;
@@ -147,15 +149,10 @@ impl Tiling {
             if self.periodic[axis] { corner } else { corner.clamp(0, last) }
         };
         let (col, row) = (corner(0, self.cols), corner(1, self.rows));
-        let (u, v) = (at.x - col as f64, at.y - row as f64);
+        let inside = at - DVec2::new(col as f64, row as f64);
         let mut sum = Sym2::default();
         let mut weight = 0.0;
-        for (i, j, w) in [
-            (0, 0, (1.0 - u) * (1.0 - v)),
-            (1, 0, u * (1.0 - v)),
-            (0, 1, (1.0 - u) * v),
-            (1, 1, u * v),
-        ] {
+        for ((i, j), w) in CORNERS.into_iter().zip(corner_weights(inside)) {
             if let Some(metric) = metric(col + i, row + j) {
                 // A trace of weight for every open corner, so that a point on a closed one has a metric too.
                 let w = w + 1e-9;
@@ -326,7 +323,8 @@ impl TensorField {
                 }
                 let (col, row) = ((i % tiling.across) * SIDE, (i / tiling.across) * SIDE);
                 sample(col, row, speeds);
-                let cells = store(speeds, &stretch[row..], root_scale.recip(), &mut tile);
+                let (stretch, shrink) = (&stretch[row..], root_scale.recip());
+                let cells = simd::dispatch(Store { speeds, stretch, shrink, tile: &mut tile });
                 (tile, cells)
             })
             .unzip_into_vecs(&mut tiles, &mut cells);
@@ -473,32 +471,40 @@ fn typical_speed(
 
 /// Stores the tensors of a block in coordinates stretched by `stretch` of each row and `shrink`. A tensor out of the range
 /// of `f32` is lost.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn store(speeds: &SpeedBlock, stretch: &[DVec2], shrink: f64, tile: &mut TensorTile) -> Cells {
-    let mut lengths = [0f32; SIDE];
-    let (mut counts, mut lost) = ([0u32; SIDE], [0u32; SIDE]);
-    for (row, by) in stretch.iter().take(SIDE).enumerate() {
-        let (x, y) = (by.x * shrink, by.y * shrink);
-        let (fxx, fxy, fyy, fdet) = (x * x, x * y, y * y, (x * y) * (x * y));
-        for i in 0..SIDE {
-            let (xx, xy) = (speeds.xx[row][i] * fxx, speeds.xy[row][i] * fxy);
-            let (yy, det) = (speeds.yy[row][i] * fyy, speeds.det[row][i] * fdet);
-            let fits = fits(xx) & fits(yy) & fits(det);
-            let place = row * SIDE + i;
-            tile.xx[place] = if fits { xx as f32 } else { 0.0 };
-            tile.xy[place] = if fits { xy as f32 } else { 0.0 };
-            tile.det[place] = if fits { det as f32 } else { 0.0 };
-            let length = (1.0 / det as f32).sqrt().sqrt();
-            lengths[i] += if fits { length } else { 0.0 };
-            counts[i] += u32::from(fits);
-            lost[i] += u32::from(speeds.is_open(row, i) & !fits);
+struct Store<'a> {
+    speeds: &'a SpeedBlock,
+    stretch: &'a [DVec2],
+    shrink: f64,
+    tile: &'a mut TensorTile,
+}
+
+impl Kernel for Store<'_> {
+    type Output = Cells;
+
+    #[inline(always)]
+    fn run(self) -> Cells {
+        let Self { speeds, stretch, shrink, tile } = self;
+        let mut lengths = [0f32; SIDE];
+        let (mut counts, mut lost) = ([0u32; SIDE], [0u32; SIDE]);
+        for (row, by) in stretch.iter().take(SIDE).enumerate() {
+            let (x, y) = (by.x * shrink, by.y * shrink);
+            let (fxx, fxy, fyy, fdet) = (x * x, x * y, y * y, (x * y) * (x * y));
+            for i in 0..SIDE {
+                let (xx, xy) = (speeds.xx[row][i] * fxx, speeds.xy[row][i] * fxy);
+                let (yy, det) = (speeds.yy[row][i] * fyy, speeds.det[row][i] * fdet);
+                let fits = fits(xx) & fits(yy) & fits(det);
+                let place = row * SIDE + i;
+                tile.xx[place] = if fits { xx as f32 } else { 0.0 };
+                tile.xy[place] = if fits { xy as f32 } else { 0.0 };
+                tile.det[place] = if fits { det as f32 } else { 0.0 };
+                let length = (1.0 / det as f32).sqrt().sqrt();
+                lengths[i] += if fits { length } else { 0.0 };
+                counts[i] += u32::from(fits);
+                lost[i] += u32::from(speeds.is_open(row, i) & !fits);
+            }
         }
+        Cells { lengths: lengths.iter().sum(), count: counts.iter().sum(), lost: lost.iter().sum() }
     }
-    Cells { lengths: lengths.iter().sum(), count: counts.iter().sum(), lost: lost.iter().sum() }
 }
 
 /// Whether a number, and the numbers it is multiplied with, keep within the range of `f32`.

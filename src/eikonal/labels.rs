@@ -1,6 +1,6 @@
 //! Which start region each node belongs to.
 
-use super::origin::origins;
+use super::predecessor::predecessors;
 use super::stencil::ring::RING;
 use super::{DistanceMap, SLACK, source};
 
@@ -21,7 +21,7 @@ impl DistanceMap {
     pub fn labels(&self) -> Vec<Option<u32>> {
         let cols = self.cols();
         let mut labels = self.seed_labels();
-        let origins = origins(&self.field, &self.cones, self.corrected());
+        let origins = predecessors(&self.field, &self.factors, self.corrected());
         let mut way = Vec::new();
         for first in 0..labels.len() {
             let mut at = first;

@@ -2,23 +2,23 @@
 //!
 //! [`Solver::solve`] discretises the equation by the semi-Lagrangian update on the eight triangles around a node
 //! (`stencil/`) and iterates it to a standstill tile by tile in order of distance (`tiles.rs`). First order
-//! in the spacing, also near the start, where the cone of a point is taken out (`cone.rs`); second order by deferred
-//! correction if asked for ([`Accuracy`], `correction/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
+//! in the spacing, also near the start, where the cone of a point is taken out (`stencil/factoring.rs`); second order by deferred
+//! correction if asked for ([`Accuracy`], `second_order/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
 //! ns of one core and 16 bytes per node, at high accuracy 80 to 150 ns and 24 bytes. [`mod@reference`] is the slow
 //! judge; `docs/solver.md` has the measurements.
 
 mod ball;
 mod board;
 mod cell;
-mod cone;
-mod correction;
 mod crew;
 mod edit;
+mod factors;
 mod field;
 mod labels;
-mod origin;
+mod predecessor;
 mod queue;
 pub mod reference;
+mod second_order;
 mod sides;
 mod source;
 mod stencil;
@@ -30,16 +30,16 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 pub(crate) use self::ball::Balls;
-use self::cone::{Cone, Cones};
-use self::correction::{Correction, FirstOrder};
+use self::factors::Factors;
 pub use self::field::TensorField;
 use self::field::{AREA, TensorTile};
+use self::predecessor::best_foot;
+use self::second_order::{Correction, FirstOrder};
 use self::source::Seeds;
 pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
 use self::stencil::UNREACHED;
-use self::stencil::ring::RING;
-use self::stencil::segment::segment;
+use self::stencil::factoring::Factor;
 pub use self::stop::Stop;
 use self::tile::Limits;
 pub use self::tiles::Statistics;
@@ -47,6 +47,7 @@ use self::tiles::{Equation, News, Solution, Values};
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
+use crate::linalg::bilinear::{CORNERS, corner_weights};
 use crate::metric::MetricField;
 
 /// Solves the eikonal equation.
@@ -110,24 +111,24 @@ impl Solver {
     ) -> Result<DistanceMap> {
         stop.check()?;
         let seeds = source::seeds(&field, starts)?;
-        let mut cones = Cones::new(&field, starts);
-        let solve = |cones: &Cones| {
+        let mut factors = Factors::new(&field, starts);
+        let solve = |factors: &Factors| {
             let equation =
-                Equation { field: &field, cones, seeds: &seeds, tolerance: self.tolerance };
+                Equation { field: &field, factors, seeds: &seeds, tolerance: self.tolerance };
             let values = Values::seeded(&field, &seeds);
             let limits = vec![Limits::default(); field.tiling.tiles()];
             tiles::solve(&equation, values, limits, News::All, stop, control)
         };
-        let mut solution = solve(&cones)?;
-        if solution.is_none() && !cones.is_empty() {
-            cones = Cones::default();
-            solution = solve(&cones)?;
+        let mut solution = solve(&factors)?;
+        if solution.is_none() && !factors.is_empty() {
+            factors = Factors::default();
+            solution = solve(&factors)?;
         }
         let Solution { values, limits, statistics } = solution.ok_or_else(unsettled)?;
         control.report("solving distance", 1.0);
         let map = DistanceMap {
             field,
-            cones,
+            factors,
             values,
             correction: None,
             limits,
@@ -148,8 +149,8 @@ impl Solver {
         control: &Control,
     ) -> Result<DistanceMap> {
         let before = map.correction.take();
-        let DistanceMap { field, cones, values, .. } = &map;
-        let solution = FirstOrder { field, cones, values, seeds };
+        let DistanceMap { field, factors, values, .. } = &map;
+        let solution = FirstOrder { field, factors, values, seeds };
         map.correction = match (self.accuracy, before) {
             (Accuracy::Fast, _) => None,
             (Accuracy::High, None) => Some(Correction::new(&solution, control)?),
@@ -181,10 +182,10 @@ impl Solver {
         stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
-        let DistanceMap { field, cones, values: before, limits, .. } = &map;
+        let DistanceMap { field, factors, values: before, limits, .. } = &map;
         let mut values = before.clone();
         values.seed(seeds);
-        let equation = Equation { field, cones, seeds, tolerance: self.tolerance };
+        let equation = Equation { field, factors, seeds, tolerance: self.tolerance };
         let news = News::Since { before, edited };
         match tiles::solve(&equation, values, limits.clone(), news, stop, control)? {
             Some(Solution { values, limits, statistics }) => {
@@ -209,7 +210,7 @@ fn unsettled() -> Error {
 #[derive(Clone, Debug)]
 pub struct DistanceMap {
     pub(crate) field: TensorField,
-    cones: Cones,
+    factors: Factors,
     /// First order.
     values: Values,
     /// What is to be added to them, in high accuracy.
@@ -389,7 +390,7 @@ impl DistanceMap {
     }
 
     fn best_foot(&self, col: usize, row: usize) -> Option<(f64, DVec2)> {
-        best_foot(&self.field, &self.cones, |c, r| self.value(c, r), col, row)
+        best_foot(&self.field, &self.factors, |c, r| self.value(c, r), col, row)
     }
 
     /// The point of the start region to go to straight from `at`, if that is the shortest way.
@@ -415,7 +416,7 @@ impl DistanceMap {
             let (c, r) = place(i, j);
             w[j][i] = self.reached(c, r)?;
         }
-        let cone = self.cones.around(&self.field, nodes().map(|(i, j)| place(i, j)));
+        let cone = self.factors.around(&self.field, nodes().map(|(i, j)| place(i, j)));
         let g0 = |at: DVec2| cone.map_or(0.0, |cone| cone.value(at - cone.at));
         for (i, j) in nodes() {
             let (c, r) = place(i, j);
@@ -437,14 +438,14 @@ impl DistanceMap {
         sees(&self.field, at, cone.at).then_some(cone.at)
     }
 
-    /// How much the cone around `at` lowers the value read at `to`, see [`mod@cone`].
+    /// How much the cone around `at` lowers the value read at `to`, see [`stencil::factoring`].
     fn shift(&self, at: DVec2, to: DVec2) -> f64 {
-        self.cone_around(at).map_or(0.0, |cone| cone.shift(at - cone.at, to - at))
+        self.cone_around(at).map_or(0.0, |cone| cone.term(at - cone.at, to - at))
     }
 
     /// The cone at the node nearest to `at`.
-    fn cone_around(&self, at: DVec2) -> Option<Cone> {
-        self.cones.around(&self.field, [(at.x.round() as isize, at.y.round() as isize)])
+    fn cone_around(&self, at: DVec2) -> Option<Factor> {
+        self.factors.around(&self.field, [(at.x.round() as isize, at.y.round() as isize)])
     }
 
     pub(crate) fn stored_at(&self, at: DVec2) -> Option<f64> {
@@ -458,24 +459,20 @@ impl DistanceMap {
     /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.
     fn interpolated(&self, at: DVec2) -> Option<f64> {
         let (col, row) = (at.x.floor() as isize, at.y.floor() as isize);
-        let (u, v) = (at.x - col as f64, at.y - row as f64);
-        let corners = [
-            (0, 0, (1.0 - u) * (1.0 - v)),
-            (1, 0, u * (1.0 - v)),
-            (0, 1, (1.0 - u) * v),
-            (1, 1, u * v),
-        ];
+        let weights = corner_weights(at - DVec2::new(col as f64, row as f64));
         let used = || {
-            corners.iter().filter(|corner| corner.2 > 0.0).map(|&(i, j, w)| (col + i, row + j, w))
+            let corners = CORNERS.into_iter().zip(weights);
+            corners.filter(|corner| corner.1 > 0.0).map(|((i, j), w)| (col + i, row + j, w))
         };
         let linear: Option<f64> = used().map(|(c, r, w)| self.reached(c, r).map(|g| w * g)).sum();
         if let Some(linear) = linear {
             // Only what is smooth is interpolated.
-            let bent = self.cones.around(&self.field, used().map(|(c, r, _)| (c, r))).map(|cone| {
-                let g0 = |at: DVec2| cone.value(at - cone.at);
-                let nodes = used().map(|(c, r, w)| w * g0(DVec2::new(c as f64, r as f64)));
-                g0(at) - nodes.sum::<f64>()
-            });
+            let bent =
+                self.factors.around(&self.field, used().map(|(c, r, _)| (c, r))).map(|cone| {
+                    let g0 = |at: DVec2| cone.value(at - cone.at);
+                    let nodes = used().map(|(c, r, w)| w * g0(DVec2::new(c as f64, r as f64)));
+                    g0(at) - nodes.sum::<f64>()
+                });
             return Some((linear + bent.unwrap_or(0.0)).max(0.0));
         }
         let metric = self.field.metric_at(at)?;
@@ -503,50 +500,6 @@ fn keys(t: f64) -> [f64; 4] {
 
 /// Within this many cells of the start the straight way to it is considered.
 const SEED_SIGHT: f64 = 4.0;
-
-/// Least value of a node over its ring, with the step to the point of the ring it came from.
-fn best_foot(
-    field: &TensorField,
-    cones: &Cones,
-    value: impl Fn(usize, usize) -> f32,
-    col: usize,
-    row: usize,
-) -> Option<(f64, DVec2)> {
-    let metric = field.metric(col, row)?;
-    let ring = RING.map(|(i, j)| {
-        let node = field.tiling.node(col as isize + i as isize, row as isize + j as isize);
-        node.map_or(f32::INFINITY, |(c, r)| value(c, r))
-    });
-    let shifts = cones.shifts(field, col, row);
-    let mut best: Option<(f64, DVec2)> = None;
-    let place = |k: usize| DVec2::new(f64::from(RING[k].0), f64::from(RING[k].1));
-    for axis in (0..8).step_by(2) {
-        for diagonal in [(axis + 1) % 8, (axis + 7) % 8] {
-            let (a, b) = (ring[axis], ring[diagonal]);
-            let (ga, gb) = (f64::from(a) + shifts[axis], f64::from(b) + shifts[diagonal]);
-            // No way is shorter than what it adds to.
-            if best.is_some_and(|(least, _)| ga.min(gb) >= least) {
-                continue;
-            }
-            let (value, foot) = match (a < UNREACHED, b < UNREACHED) {
-                (true, true) => {
-                    let (value, theta) = segment(ga, place(axis), gb, place(diagonal), metric);
-                    (value, place(axis).lerp(place(diagonal), theta))
-                }
-                (true, false) => (ga + metric.norm(place(axis)), place(axis)),
-                // Past an axis neighbour, on this side or the other; between two walls there is no way.
-                (false, true) if a.min(ring[(2 * diagonal + 8 - axis) % 8]) < f32::INFINITY => {
-                    (gb + metric.norm(place(diagonal)), place(diagonal))
-                }
-                _ => continue,
-            };
-            if best.is_none_or(|(least, _)| value < least) {
-                best = Some((value, foot));
-            }
-        }
-    }
-    best
-}
 
 #[cfg(test)]
 mod tests;

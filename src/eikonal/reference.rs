@@ -2,14 +2,15 @@
 
 use glam::DVec2;
 
-use super::cone::Cones;
+use super::factors::Factors;
 use super::field::TensorField;
+use super::predecessor::best_foot;
 use super::source::StartRegion;
 use super::stencil::ring::RING;
 use super::tile::Limits;
 use super::tile::coefficients::ceiling;
 use super::tiles::Values;
-use super::{DistanceMap, Statistics, best_foot, source};
+use super::{DistanceMap, Statistics, source};
 use crate::control::Control;
 use crate::error::{Error, Result};
 
@@ -22,7 +23,7 @@ const MOST_SWEEPS: usize = 2000;
 /// # Errors
 /// As [`Solver::solve`](super::Solver::solve).
 pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> Result<DistanceMap> {
-    let cones = Cones::new(&field, starts);
+    let factors = Factors::new(&field, starts);
     let seeds = source::seeds(&field, starts)?;
     let mut values = Values::seeded(&field, &seeds);
     let (cols, rows) = (field.cols(), field.rows());
@@ -36,7 +37,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
             for i in 0..cols {
                 let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
                 let old = values.get(col, row);
-                let new = best_foot(&field, &cones, |c, r| values.get(c, r), col, row)
+                let new = best_foot(&field, &factors, |c, r| values.get(c, r), col, row)
                     .map_or(f32::INFINITY, |(g, _)| g as f32);
                 let (tile, place) = field.tiling.place(col, row);
                 let seed = seeds[tile].as_ref().map_or(f32::INFINITY, |seeds| seeds[place]);
@@ -57,7 +58,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
     let limits = vec![unknown; field.tiling.tiles()];
     Ok(DistanceMap {
         field,
-        cones,
+        factors,
         values,
         limits,
         correction: None,

@@ -4,9 +4,9 @@ use std::array::from_fn;
 
 use glam::DVec2;
 
-use super::cone::Cone;
 use super::field::{AREA, TensorField, Tiling};
 use super::stencil::UNREACHED;
+use super::stencil::factoring::Factor;
 use super::stencil::segment::segment;
 use crate::error::{Error, Result};
 use crate::linalg::Sym2;
@@ -183,11 +183,12 @@ impl StartRegion {
         let travelled = self.value * field.root_scale();
         let mut set = |col, row, length| set(col, row, travelled + length);
         for (at, sides) in self.corners() {
-            let Some(cone) = Cone::new(field, at, sides, travelled) else { continue };
+            let Some(metric) = field.metric_at(at) else { continue };
+            let factor = Factor::new(at, metric, sides, travelled);
             let is_clear = is_clear(field, at, POINT_RADIUS);
             let vicinity = Vicinity::around(field, at);
             near(field, at, at, POINT_RADIUS, |col, row, node, _| {
-                if cone.holds(node - at)
+                if factor.holds(node - at)
                     && (is_clear || sees(field, node, at))
                     && let Some(length) = geodesic(&vicinity, node, at)
                 {

@@ -11,16 +11,16 @@
 use rayon::prelude::*;
 
 use super::board::{Board, LimitsBoard};
-use super::cone::Cones;
 use super::crew;
+use super::factors::Factors;
 use super::field::{AREA, SIDE, TensorField, TensorTile, Tiling};
 use super::queue::{Job, Queue};
 use super::sides::{ITSELF, SIDES, neighbours, opposite};
 use super::source::Seeds;
 use super::stencil::UNREACHED;
 use super::stop::{self, Standing, Stop};
-use super::tile::kernel::{self, Problem, Workspace};
-use super::tile::{Limits, Rule, Tile};
+use super::tile::kernel::{self, Problem, Rule, Workspace};
+use super::tile::{Limits, Tile};
 use crate::control::Control;
 use crate::error::Result;
 
@@ -117,7 +117,7 @@ impl Outcome {
     }
 }
 
-/// Activations of a tile after which a solve is given up, without and with cones. Tiles of fields that settle took at
+/// Activations of a tile after which a solve is given up, without and with factors. Tiles of fields that settle took at
 /// most 34 at ratio 400, 86 at 2500, 19 on rough isotropic ones.
 const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 
@@ -236,7 +236,7 @@ pub(super) struct Solution {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Equation<'a> {
     pub(super) field: &'a TensorField,
-    pub(super) cones: &'a Cones,
+    pub(super) factors: &'a Factors,
     pub(super) seeds: &'a [Option<Box<Seeds>>],
     pub(super) tolerance: f32,
 }
@@ -289,7 +289,7 @@ pub(super) struct End {
 /// Solves the tiles that wait and those that they wake, in rounds, until `stop` allows to end. Before
 /// a round `open` is told its jobs.
 pub(super) fn relax(
-    &Equation { field, cones, seeds, tolerance }: &Equation<'_>,
+    &Equation { field, factors, seeds, tolerance }: &Equation<'_>,
     rule: Rule,
     stop: &Stop,
     Desk { queue, activations, shared, reached, slack }: &mut Desk,
@@ -298,7 +298,7 @@ pub(super) fn relax(
 ) -> Result<End> {
     let tiling = field.tiling;
     let window = WINDOW_CELLS * field.mean_step;
-    let most = MOST_ACTIVATIONS[usize::from(!cones.is_empty())];
+    let most = MOST_ACTIVATIONS[usize::from(!factors.is_empty())];
     let mut news = f32::INFINITY;
     let mut settles = true;
     let mut statistics = Statistics::default();
@@ -307,9 +307,9 @@ pub(super) fn relax(
         let job = Job::from_bits(job);
         let tile = job.tile as usize;
         let first = tiling.first(tile);
-        let cone = cones.of_tile(tile).map(|cone| (cone, first));
+        let factor = factors.of_tile(tile).map(|factor| (factor, first));
         let input =
-            Tile { tensors: &field.tiles[tile], cone, tolerance, seeds: seeds[tile].as_deref() };
+            Tile { tensors: &field.tiles[tile], factor, tolerance, seeds: seeds[tile].as_deref() };
         solve_tile(workspace, &tiling, &input, rule, shared, job).to_bits()
     };
     let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 11]]| -> Result<()> {

@@ -1,6 +1,8 @@
-//! Small linear algebra that every stage uses.
+//! Small linear algebra that every stage uses, and how it is done many numbers at a time.
 
+pub(crate) mod bilinear;
 pub(crate) mod lanes;
+pub(crate) mod simd;
 mod sym2;
 
 pub use self::sym2::Sym2;

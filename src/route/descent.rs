@@ -9,6 +9,7 @@
 use glam::DVec2;
 
 use crate::eikonal::DistanceMap;
+use crate::linalg::bilinear::{CORNERS, corner_weights};
 
 /// Step of the midpoint rule in cells. A half or a quarter, and fourth order, give the same lines.
 const STEP: f64 = 0.5;
@@ -56,11 +57,9 @@ fn follow(distance: &DistanceMap, at: DVec2, value: f64) -> Option<(DVec2, f64)>
 /// Unit vector of descent in grid coordinates, bilinear between the corners of the cell.
 fn direction(distance: &DistanceMap, at: DVec2) -> Option<DVec2> {
     let (col, row) = clear_cell(distance, at)?;
-    let (u, v) = (at.x - col as f64, at.y - row as f64);
+    let weights = corner_weights(at - DVec2::new(col as f64, row as f64));
     let mut sum = DVec2::ZERO;
-    for (i, j, weight) in
-        [(0, 0, (1.0 - u) * (1.0 - v)), (1, 0, u * (1.0 - v)), (0, 1, (1.0 - u) * v), (1, 1, u * v)]
-    {
+    for ((i, j), weight) in CORNERS.into_iter().zip(weights) {
         if weight > 0.0 {
             sum += weight * distance.foot(col + i, row + j)?.try_normalize()?;
         }

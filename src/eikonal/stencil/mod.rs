@@ -1,5 +1,7 @@
 //! The stencil: a node, the ring of its neighbours, and the eight triangles between them.
 
+pub(crate) mod factoring;
+pub(crate) mod foot;
 pub(crate) mod ring;
 pub(crate) mod segment;
 

@@ -1,8 +1,9 @@
-//! The least over one segment of the ring.
+//! The least over one segment of the ring: in plain form, and in the closed form of the fast kernels.
 
 use glam::DVec2;
 
 use crate::linalg::Sym2;
+use crate::linalg::lanes::{greatest, least};
 
 /// The least of `(1−θ) ga + θ gb + ‖(1−θ) a + θ b‖_M` over `0 ≤ θ ≤ 1`, and the `θ`.
 ///
@@ -24,4 +25,34 @@ pub(crate) fn segment(ga: f64, a: DVec2, gb: f64, b: DVec2, metric: Sym2) -> (f6
         0.0
     };
     (ga + theta * d + metric.norm(a.lerp(b, theta)), theta)
+}
+
+/// The same minimum for a triangle with axis neighbour `a` and diagonal neighbour `b`, in terms of `D = M⁻¹`.
+///
+/// Let `w = b − a`, `d = gb − ga`, and `D = [s β; β q]` in the basis `(a, w)`. The eikonal equation
+/// `s t² − 2β t d + q d² = 1`, `t = u − ga`, has the causal root
+///
+/// ```text
+///   t(d) = (β/s) d + √(1/s − (det D/s²) d²)
+/// ```
+///
+/// It is the least over the segment where the slope of the sum (see [`segment`]) changes sign between the ends:
+/// `lo ≤ d ≤ hi` with `lo = −bᵀMw/‖b‖`, `hi = −aᵀMw/‖a‖`. Outside, the least is at an end.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClosedForm {
+    pub(crate) inv_s: f32,
+    pub(crate) det_over_s2: f32,
+    pub(crate) beta_over_s: f32,
+    pub(crate) lo: f32,
+    pub(crate) hi: f32,
+}
+
+impl ClosedForm {
+    /// The value through the segment; where the least is at an end, not below that.
+    #[inline(always)]
+    pub(crate) fn through(self, ga: f32, gb: f32) -> f32 {
+        let Self { inv_s, det_over_s2, beta_over_s, lo, hi } = self;
+        let d = greatest(least(gb - ga, hi), lo);
+        ga + (beta_over_s * d + greatest(inv_s - det_over_s2 * (d * d), 0.0).sqrt())
+    }
 }

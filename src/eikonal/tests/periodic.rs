@@ -89,7 +89,7 @@ fn an_unrolled_copy_has_the_same_distances() {
                 let images = (0..9).map(|k| copy.at_node(c + k % 3 * cols, r + k / 3 * rows));
                 images.min_by(f64::total_cmp)
             };
-            // Cones reach farther on the larger grid; the scheme is the same but for that.
+            // Factors reach farther on the larger grid; the scheme is the same but for that.
             let errors = errors(&map, exact);
             let most = if accuracy == Accuracy::Fast { 1e-2 } else { 2e-3 };
             assert!(errors.1 < most, "{cols} x {rows} {accuracy:?}: {errors:?}");

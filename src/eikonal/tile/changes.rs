@@ -4,7 +4,7 @@
 
 use std::array::from_fn;
 
-use super::{ALL, Block, Lines};
+use super::{ALL, Block, LineMask};
 use crate::eikonal::field::SIDE;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::RING;
@@ -15,7 +15,8 @@ pub(crate) const ROUNDING: f32 = 2.4e-7;
 
 /// The rows and the columns of a tile of a size next to neighbours in a set, one bit each in the order of [`RING`]; a corner is in
 /// the row. Bit 8 is the tile itself: all rows.
-pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [Lines; 2] {
+#[inline(always)]
+pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [LineMask; 2] {
     let line = |at: i32, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
     let itself = if sides & 1 << RING.len() != 0 { ALL } else { 0 };
     let beside = (0..RING.len()).filter(|side| sides & 1 << side != 0);
@@ -28,6 +29,7 @@ pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [Lines; 2] {
 /// For each neighbour, in the order of [`RING`], the least value among the changes in a tile of a size that could improve it, or
 /// supported it; infinite if none. `slacks` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
 /// `g(y) < g(x) + slack`.
+#[inline(always)]
 pub(super) fn for_neighbours(
     before: &Block,
     after: &Block,
@@ -64,6 +66,7 @@ pub(super) fn for_neighbours(
 }
 
 /// The least of the changes in the first `count` nodes of a line that could improve the line `beside` it.
+#[inline(always)]
 fn least_change(
     count: usize,
     old: [f32; SIDE],

@@ -1,235 +1,213 @@
-//! What the update needs of the speed tensors.
+//! What the update needs of the speed tensors, line by line.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use glam::DVec2;
+use glam::{DVec2, Vec2Swizzles as _};
 
-use super::kernel::How;
 use super::{Limits, Tile};
-use crate::eikonal::cone::Cone;
 use crate::eikonal::field::SIDE;
 use crate::eikonal::stencil::UNREACHED;
-use crate::eikonal::stencil::ring::RING;
-use crate::linalg::Sym2;
-use crate::linalg::lanes::{choose, greatest, lanes, least};
+use crate::eikonal::stencil::ring::{TRIANGLES, Triangle};
+use crate::eikonal::stencil::segment::ClosedForm;
+use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
 
-/// What the update needs of `D` at the [`SIDE`] nodes of a row.
+/// What the update needs of `D` at the [`SIDE`] nodes of a line.
 ///
-/// For a triangle with axis neighbour `a` and diagonal neighbour `b`, `w = b − a`, `d = gb − ga`, let `D = [s β; β q]` in the
-/// basis `(a, w)`. The eikonal equation `s t² − 2β t d + q d² = 1`, `t = u − ga`, has the causal root
-///
-/// ```text
-///   t(d) = (β/s) d + √(1/s − (det D/s²) d²)
-/// ```
-///
-/// It is the least over the segment where the slope of the sum (see [`segment`]) changes sign between the ends:
-/// `lo ≤ d ≤ hi` with `lo = −bᵀMw/‖b‖`, `hi = −aᵀMw/‖a‖`. Outside, the least is at an end.
+/// [`ClosedForm`] has the equation. `D = [xx xy; xy yy]` is at the same time `[s β; β q]` for `a = (1, 0)`, `b = (1, 1)`. The
+/// triangles along y have x and y exchanged; those with the other diagonal have `β` and `hi` with the other sign.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coefficients {
-    /// `1/s`, `det D/s²` and `β/s` for triangles along x, then along y; `β` changes its sign in the other two quadrants.
-    pub(crate) ix: [f32; SIDE],
-    pub(crate) ex: [f32; SIDE],
-    pub(crate) bx: [f32; SIDE],
-    pub(crate) iy: [f32; SIDE],
-    pub(crate) ey: [f32; SIDE],
-    pub(crate) by: [f32; SIDE],
-    /// `hi` along x and y; with the other sign in the other two quadrants.
-    pub(crate) hx: [f32; SIDE],
-    pub(crate) hy: [f32; SIDE],
-    /// `lo` of the triangles with a diagonal (1,1) along x and y, then with (1,−1).
-    pub(crate) rx: [f32; SIDE],
-    pub(crate) ry: [f32; SIDE],
-    pub(crate) fx: [f32; SIDE],
-    pub(crate) fy: [f32; SIDE],
-    /// Lengths of the steps (1,0), (0,1), (1,1), (1,−1).
-    pub(crate) east: [f32; SIDE],
-    pub(crate) south: [f32; SIDE],
-    pub(crate) rising: [f32; SIDE],
-    pub(crate) falling: [f32; SIDE],
+    /// Of the triangles with the axis neighbour along x, and along y.
+    along: [Along; 2],
+    /// Lengths of the steps to the first four of the ring, and to those opposite.
+    pub(crate) step: [Lanes; 4],
     /// A change below this is no reason to go on.
-    pub(crate) tolerance: [f32; SIDE],
+    pub(crate) tolerance: Lanes,
     /// The node is only lowered to below this: infinite but for nodes of the start.
-    pub(crate) ceiling: [f32; SIDE],
+    pub(crate) ceiling: Lanes,
 }
+
+/// [`ClosedForm`] of the four triangles along an axis.
+#[derive(Clone, Copy, Debug)]
+struct Along {
+    inv_s: Lanes,
+    det_over_s2: Lanes,
+    /// Both with the other sign where the diagonal is falling.
+    beta_over_s: Lanes,
+    hi: Lanes,
+    lo_rising: Lanes,
+    lo_falling: Lanes,
+}
+
+/// The speed tensors of a line of nodes: `xx`, `xy` and the determinant, 0 where closed. `xx·yy − xy²` would lose the determinant of a very
+/// anisotropic tensor in rounding.
+pub(crate) type LineTensors = [Lanes; 3];
 
 impl Coefficients {
     /// Nodes that are never updated: all steps are endless.
-    pub(crate) const CLOSED: Self = Self {
-        ix: [f32::INFINITY; SIDE],
-        ex: [0.0; SIDE],
-        bx: [0.0; SIDE],
-        iy: [f32::INFINITY; SIDE],
-        ey: [0.0; SIDE],
-        by: [0.0; SIDE],
-        hx: [0.0; SIDE],
-        hy: [0.0; SIDE],
-        rx: [0.0; SIDE],
-        ry: [0.0; SIDE],
-        fx: [0.0; SIDE],
-        fy: [0.0; SIDE],
-        east: [f32::INFINITY; SIDE],
-        south: [f32::INFINITY; SIDE],
-        rising: [f32::INFINITY; SIDE],
-        falling: [f32::INFINITY; SIDE],
-        tolerance: [f32::INFINITY; SIDE],
-        ceiling: [f32::INFINITY; SIDE],
+    pub(crate) const CLOSED: Self = {
+        let (none, endless) = ([0.0; SIDE], [f32::INFINITY; SIDE]);
+        let along = Along {
+            inv_s: endless,
+            det_over_s2: none,
+            beta_over_s: none,
+            hi: none,
+            lo_rising: none,
+            lo_falling: none,
+        };
+        Self { along: [along; 2], step: [endless; 4], tolerance: endless, ceiling: endless }
     };
+
+    /// Those of a line of a tile, a column where `by_columns`.
+    #[inline(always)]
+    pub(crate) fn prepare(
+        &mut self,
+        tile: &Tile<'_>,
+        line: usize,
+        by_columns: bool,
+        [xxs, xys, dets]: &LineTensors,
+        limits: &mut LaneLimits,
+    ) {
+        let (mut obtuse, mut longest) = ([0f32; SIDE], [0f32; SIDE]);
+        for i in 0..SIDE {
+            let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
+            let open = det > 0.0;
+            let inv_xx = 1.0 / xx;
+            let yy = (det + xy * xy) * inv_xx;
+            let (inv_yy, inv_det) = (1.0 / yy, 1.0 / det);
+            // M = D⁻¹ is [yy −xy; −xy xx]/det.
+            let (east, south) = ((yy * inv_det).sqrt(), (xx * inv_det).sqrt());
+            let rising = (greatest(xx + yy - 2.0 * xy, 1e-30) * inv_det).sqrt();
+            let falling = (greatest(xx + yy + 2.0 * xy, 1e-30) * inv_det).sqrt();
+            let (inv_rising, inv_falling) = (inv_det / rising, inv_det / falling);
+            let steps = [east, rising, south, falling];
+            for k in 0..4 {
+                self.step[k][i] = choose(open, steps[k], f32::INFINITY);
+            }
+            for axis in 0..2 {
+                let (s, inv_s) = ([xx, yy][axis], [inv_xx, inv_yy][axis]);
+                let (inv_q, length_of_a) = ([inv_yy, inv_xx][axis], [east, south][axis]);
+                let along = &mut self.along[axis];
+                along.inv_s[i] = choose(open, inv_s, f32::INFINITY);
+                along.det_over_s2[i] = choose(open, det * inv_s * inv_s, 0.0);
+                along.beta_over_s[i] = choose(open, xy * inv_s, 0.0);
+                along.hi[i] = choose(open, xy * length_of_a * inv_q, 0.0);
+                along.lo_rising[i] = choose(open, (xy - s) * inv_rising, 0.0);
+                along.lo_falling[i] = choose(open, -(s + xy) * inv_falling, 0.0);
+                // By how much the least over a segment may lie below an end: see `Limits::slack`.
+                obtuse[i] = greatest(obtuse[i], along.hi[i].abs() - length_of_a);
+                obtuse[i] = greatest(obtuse[i], -along.lo_rising[i] - rising);
+                obtuse[i] = greatest(obtuse[i], -along.lo_falling[i] - falling);
+            }
+            let shortest = least(least(east, south), least(rising, falling));
+            self.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
+            // A closed node never changes: at the seam of a periodic grid it stands for one of another tile.
+            self.ceiling[i] = choose(open, f32::INFINITY, f32::NEG_INFINITY);
+            obtuse[i] = choose(open, obtuse[i], 0.0);
+            longest[i] = choose(open, greatest(rising, falling), 0.0);
+        }
+        // In a loop of its own, or the limits are scattered lane by lane.
+        for i in 0..SIDE {
+            limits.slack[i] = greatest(limits.slack[i], obtuse[i]);
+            limits.longest_step[i] = greatest(limits.longest_step[i], longest[i]);
+        }
+        let Some(seeds) = tile.seeds else { return };
+        for i in 0..SIDE {
+            let place = if by_columns { i * SIDE + line } else { line * SIDE + i };
+            let [east, rising, south, falling] = [0, 1, 2, 3].map(|k| self.step[k][i]);
+            let shortest = least(least(east, south), least(rising, falling));
+            self.ceiling[i] = least(self.ceiling[i], ceiling(seeds[place], shortest));
+        }
+    }
+
+    /// The update of node `i` through a triangle.
+    #[inline(always)]
+    pub(crate) fn closed_form(&self, t: Triangle, i: usize) -> ClosedForm {
+        let along = &self.along[usize::from(t.along_y)];
+        let (beta_over_s, hi) = (along.beta_over_s[i], along.hi[i]);
+        ClosedForm {
+            inv_s: along.inv_s[i],
+            det_over_s2: along.det_over_s2[i],
+            beta_over_s: if t.falling { -beta_over_s } else { beta_over_s },
+            lo: if t.falling { along.lo_falling[i] } else { along.lo_rising[i] },
+            hi: if t.falling { -hi } else { hi },
+        }
+    }
+
+    /// The best value of node `i` over its ring: over the eight nodes, and between them over the eight segments.
+    #[inline(always)]
+    pub(crate) fn best(&self, ring: [f32; 8], i: usize) -> f32 {
+        let mut best = f32::INFINITY;
+        for k in 0..4 {
+            best = least(best, least(ring[k], ring[k + 4]) + self.step[k][i]);
+        }
+        for t in TRIANGLES {
+            best = least(best, self.closed_form(t, i).through(ring[t.a], ring[t.b]));
+        }
+        best
+    }
+
+    /// `min(1/xx, 1/yy)/2` at node `i`: no step is shorter than its root.
+    #[inline(always)]
+    pub(crate) fn least_square_of_steps(&self, i: usize) -> f32 {
+        0.5 * least(self.along[0].inv_s[i], self.along[1].inv_s[i])
+    }
 }
 
 /// [`Limits`] of the nodes in each lane; their greatest at once would be a chain of comparisons, one after the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LaneLimits {
-    slack: [f32; SIDE],
-    /// By how much a cone lowers a neighbour's value at most.
-    shift: [f32; SIDE],
-    longest_step: [f32; SIDE],
+    slack: Lanes,
+    /// By how much factoring lowers a neighbour's value at most.
+    term: Lanes,
+    longest_step: Lanes,
 }
 
 impl LaneLimits {
     /// Those of all nodes.
     pub(crate) fn of_all(&self) -> Limits {
-        let all = |lanes: &[f32; SIDE]| lanes.iter().copied().fold(0.0, greatest);
-        Limits { slack: all(&self.slack) + all(&self.shift), longest_step: all(&self.longest_step) }
+        let all = |lanes: &Lanes| lanes.iter().copied().fold(0.0, greatest);
+        Limits { slack: all(&self.slack) + all(&self.term), longest_step: all(&self.longest_step) }
     }
 }
 
-/// The tensors of one line of a tile: `xx`, `xy` and the determinant.
+/// The tensors of one line of a tile.
 #[inline(always)]
-pub(crate) fn tensors(tile: &Tile<'_>, line: usize, how: How) -> [[f32; SIDE]; 3] {
+pub(crate) fn line_tensors(tile: &Tile<'_>, line: usize, by_columns: bool) -> LineTensors {
     let all = tile.tensors;
-    if !how.by_columns {
-        let place = line * SIDE;
-        return [lanes(&all.xx, place), lanes(&all.xy, place), lanes(&all.det, place)];
+    if !by_columns {
+        let first = line * SIDE;
+        return [lanes(&all.xx, first), lanes(&all.xy, first), lanes(&all.det, first)];
     }
     let (mut xx, mut xy, mut det) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
         let place = i * SIDE + line;
         (xx[i], xy[i], det[i]) = (all.xx[place], all.xy[place], all.det[place]);
     }
+    // What is `yy` by rows.
     for i in 0..SIDE {
         xx[i] = (det[i] + xy[i] * xy[i]) / xx[i];
     }
     [xx, xy, det]
 }
 
-/// The coefficients of one line of a tile. `D` is stored as (xx, xy, det): the determinant of a very anisotropic
-/// tensor would be lost in the rounding of xx·yy − xy².
+/// The factoring terms at the nodes of one line of a tile.
 #[inline(always)]
-pub(crate) fn prepare(
+pub(crate) fn factoring_terms(
     tile: &Tile<'_>,
     line: usize,
-    how: How,
-    k: &mut Coefficients,
+    by_columns: bool,
+    tensors: &LineTensors,
+    terms: &mut [Lanes; 8],
     limits: &mut LaneLimits,
 ) {
-    let [xxs, xys, dets] = tensors(tile, line, how);
-    let (mut slack, mut longest) = ([0f32; SIDE], [0f32; SIDE]);
+    let Some((factor, first)) = tile.factor else { return };
+    let (factor, first) =
+        if by_columns { (factor.transposed(), first.yx()) } else { (*factor, first) };
+    let from = (first - factor.at) + DVec2::new(0.0, line as f64);
+    let largest = factor.terms_of_line(from, tensors, terms);
     for i in 0..SIDE {
-        let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
-        let open = det > 0.0;
-        let ix = 1.0 / xx;
-        let yy = (det + xy * xy) * ix;
-        let (iy, idet) = (1.0 / yy, 1.0 / det);
-        let (east, south) = ((yy * idet).sqrt(), (xx * idet).sqrt());
-        let rising2 = greatest(xx + yy - 2.0 * xy, 1e-30) * idet;
-        let falling2 = greatest(xx + yy + 2.0 * xy, 1e-30) * idet;
-        let (rising, falling) = (rising2.sqrt(), falling2.sqrt());
-        let (irising, ifalling) = (idet / rising, idet / falling);
-        let shortest = least(least(east, south), least(rising, falling));
-        k.ix[i] = choose(open, ix, f32::INFINITY);
-        k.ex[i] = choose(open, det * ix * ix, 0.0);
-        k.bx[i] = choose(open, xy * ix, 0.0);
-        k.iy[i] = choose(open, iy, f32::INFINITY);
-        k.ey[i] = choose(open, det * iy * iy, 0.0);
-        k.by[i] = choose(open, xy * iy, 0.0);
-        k.hx[i] = choose(open, xy * east * iy, 0.0);
-        k.hy[i] = choose(open, xy * south * ix, 0.0);
-        k.rx[i] = choose(open, (xy - xx) * irising, 0.0);
-        k.ry[i] = choose(open, (xy - yy) * irising, 0.0);
-        k.fx[i] = choose(open, -(xx + xy) * ifalling, 0.0);
-        k.fy[i] = choose(open, -(yy + xy) * ifalling, 0.0);
-        k.east[i] = choose(open, east, f32::INFINITY);
-        k.south[i] = choose(open, south, f32::INFINITY);
-        k.rising[i] = choose(open, rising, f32::INFINITY);
-        k.falling[i] = choose(open, falling, f32::INFINITY);
-        k.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
-        // A closed node never changes: at the seam of a periodic grid it stands for one of another tile.
-        k.ceiling[i] = choose(open, f32::INFINITY, f32::NEG_INFINITY);
-        let obtuse = greatest(
-            greatest(k.hx[i].abs() - east, k.hy[i].abs() - south),
-            greatest(
-                greatest(-k.rx[i] - rising, -k.ry[i] - rising),
-                greatest(-k.fx[i] - falling, -k.fy[i] - falling),
-            ),
-        );
-        slack[i] = choose(open, obtuse, 0.0);
-        longest[i] = choose(open, greatest(rising, falling), 0.0);
-    }
-    // In a loop of its own, or the limits are scattered lane by lane.
-    for i in 0..SIDE {
-        limits.slack[i] = greatest(limits.slack[i], slack[i]);
-        limits.longest_step[i] = greatest(limits.longest_step[i], longest[i]);
-    }
-    if let Some(seeds) = tile.seeds {
-        for i in 0..SIDE {
-            let place = if how.by_columns { i * SIDE + line } else { line * SIDE + i };
-            let shortest = least(least(k.east[i], k.south[i]), least(k.rising[i], k.falling[i]));
-            k.ceiling[i] = least(k.ceiling[i], ceiling(seeds[place], shortest));
-        }
-    }
-}
-
-/// [`Cone::shift`] for the nodes of one line.
-#[inline(always)]
-pub(crate) fn prepare_shifts(
-    tile: &Tile<'_>,
-    line: usize,
-    how: How,
-    shifts: &mut [[f32; SIDE]; 8],
-    limits: &mut LaneLimits,
-) {
-    let Some((cone, first)) = tile.cone else { return };
-    let turn = |v: DVec2| if how.by_columns { DVec2::new(v.y, v.x) } else { v };
-    let from = turn(first - cone.at);
-    let (m, sides) = (cone.metric, cone.sides.map(turn));
-    let m = if how.by_columns { Sym2::new(m.yy, m.xy, m.xx) } else { m };
-    let [p, q] = sides.map(|side| m.apply(side));
-    let (xx, xy, yy) = (m.xx as f32, m.xy as f32, m.yy as f32);
-    let (px, py, qx, qy) = (p.x as f32, p.y as f32, q.x as f32, q.y as f32);
-    let det0 = m.det() as f32;
-    let (radius2, alike2) = ((cone.radius * cone.radius) as f32, (cone.alike * cone.alike) as f32);
-    let y = (from.y + line as f64) as f32;
-    let [dxx, dxy, ddet] = tensors(tile, line, how);
-    let mut largest = [0f32; SIDE];
-    for i in 0..SIDE {
-        // Rounded once, so that rows and columns agree on which nodes the cone reaches.
-        let x = (from.x + i as f64) as f32;
-        let r2 = x * x + y * y;
-        let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
-        let g2 = greatest(mx * x + my * y, 0.0);
-        let g = g2.sqrt();
-        let share = choose(g > 0.0, 1.0 / g, 0.0);
-        for k in 0..8 {
-            let (dx, dy) = (RING[k].0 as f32, RING[k].1 as f32);
-            let a = mx * dx + my * dy;
-            let b = xx * (dx * dx) + 2.0 * xy * (dx * dy) + yy * (dy * dy);
-            let sum = g + greatest(g2 + (2.0 * a + b), 0.0).sqrt();
-            let isum = choose(sum > 0.0, 1.0 / sum, 0.0);
-            let holds =
-                (px * (x + dx) + py * (y + dy) <= 0.0) & (qx * (x + dx) + qy * (y + dy) <= 0.0);
-            shifts[k][i] = choose(holds, (a * (2.0 * a + b) * isum - g * b) * (isum * share), 0.0);
-            largest[i] = greatest(largest[i], -shifts[k][i]);
-        }
-        let dyy = (ddet[i] + dxy[i] * dxy[i]) / dxx[i];
-        let trace = xx * dxx[i] + 2.0 * xy * dxy[i] + yy * dyy;
-        let applies = (px * x + py * y <= 0.0)
-            & (qx * x + qy * y <= 0.0)
-            & (r2 <= radius2)
-            & ((r2 <= alike2) | Cone::applies(trace, ddet[i] * det0, dxx[i] + dyy, largest[i]));
-        limits.shift[i] = greatest(limits.shift[i], choose(applies, largest[i], 0.0));
-        for k in 0..8 {
-            shifts[k][i] = choose(applies, shifts[k][i], 0.0);
-        }
+        limits.term[i] = greatest(limits.term[i], largest[i]);
     }
 }
 

@@ -1,17 +1,17 @@
-//! Tiles mirrored on their diagonal, so that columns can be swept as rows are.
+//! Tiles transposed, so that columns can be swept as rows are.
 
 use glam::{Mat4, Vec4};
 
 use super::{BLOCK, Block};
 use crate::eikonal::field::SIDE;
 
-/// Side of the squares that are mirrored in registers: number by number takes three times as long.
+/// Side of the squares that are transposed in registers: number by number takes three times as long.
 const SQUARE: usize = 4;
 
-/// Mirrors a tile and the nodes around it.
-pub(crate) fn mirror_block(block: &mut Block) {
+/// Transposes a tile and its halo.
+pub(crate) fn transpose_block(block: &mut Block) {
     const LAST: usize = BLOCK - 1;
-    mirror(&mut block[1..LAST], 1);
+    transpose(&mut block[1..LAST], 1);
     for i in 1..BLOCK {
         swap(block, i, 0);
     }
@@ -26,8 +26,8 @@ fn swap(block: &mut Block, row: usize, col: usize) {
     block[col][row] = value;
 }
 
-/// Mirrors a tile, the nodes of which begin at place `first` of the lines.
-pub(crate) fn mirror<const N: usize>(lines: &mut [[f32; N]], first: usize) {
+/// Transposes a tile, the nodes of which begin at place `first` of the lines.
+pub(crate) fn transpose<const N: usize>(lines: &mut [[f32; N]], first: usize) {
     for row in (0..SIDE).step_by(SQUARE) {
         for col in (0..=row).step_by(SQUARE) {
             let (here, there) = (square(lines, row, first + col), square(lines, col, first + row));
@@ -55,10 +55,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn mirrors_all_of_a_block() {
+    fn transposes_all_of_a_block() {
         let block: Block = from_fn(|row| from_fn(|col| (100 * row + col) as f32));
-        let mut mirrored = block;
-        mirror_block(&mut mirrored);
-        assert_eq!(mirrored, from_fn(|row| from_fn(|col| block[col][row])));
+        let mut transposed = block;
+        transpose_block(&mut transposed);
+        assert_eq!(transposed, from_fn(|row| from_fn(|col| block[col][row])));
     }
 }

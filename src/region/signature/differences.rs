@@ -3,13 +3,13 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use glam::DVec2;
-use multiversion::multiversion;
 
 use super::cut::Run;
 use super::extent::Size;
 use super::moments::Moments;
 use super::tensors::{MISSING, Tensor, Tensors, apart, sum};
 use crate::linalg::Sym2;
+use crate::linalg::simd::Kernel;
 use crate::surface::SurfaceJet;
 use crate::surface::{BLOCK, Lanes};
 
@@ -19,43 +19,46 @@ const STEP: f64 = 1.0 / 16.0;
 
 /// Moments of the differences to the neighbours on the surface: at a distance of [`STEP`] both ways along the two tangents in which
 /// `C` changes most and least, per distance.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-pub(super) fn along_surface(
-    tensors: &Tensors<'_>,
-    sizes: &[Size],
-    run: &Run<'_>,
-    moments: &mut [Moments; BLOCK],
-) {
-    let steps = run.of_regions(|region| STEP * sizes[region].side);
-    let first = run.node[1] * tensors.cut.cols + run.node[0];
-    let changes = changes(tensors, run);
-    let neighbours = neighbours(run, &steps, &changes);
-    let cells = [0, 1, 2, 3].map(|k| tensors.cells(&neighbours[k]));
-    let mut squares = [[MISSING; BLOCK]; 4];
-    for (i, label) in run.labels.iter().enumerate() {
-        let Some(region) = *label else { continue };
-        for k in 0..4 {
-            let at = DVec2::new(neighbours[k][0][i], neighbours[k][1][i]);
-            squares[k][i] = tensors.apart(first + i, cells[k][i], at, region);
+pub(super) struct AlongSurface<'a> {
+    pub(super) tensors: &'a Tensors<'a>,
+    pub(super) sizes: &'a [Size],
+    pub(super) run: &'a Run<'a>,
+    pub(super) moments: &'a mut [Moments; BLOCK],
+}
+
+impl Kernel for AlongSurface<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tensors, sizes, run, moments } = self;
+        let steps = run.of_regions(|region| STEP * sizes[region].side);
+        let first = run.node[1] * tensors.cut.cols + run.node[0];
+        let changes = changes(tensors, run);
+        let neighbours = neighbours(run, &steps, &changes);
+        let cells = [0, 1, 2, 3].map(|k| tensors.cells(&neighbours[k]));
+        let mut squares = [[MISSING; BLOCK]; 4];
+        for (i, label) in run.labels.iter().enumerate() {
+            let Some(region) = *label else { continue };
+            for k in 0..4 {
+                let at = DVec2::new(neighbours[k][0][i], neighbours[k][1][i]);
+                squares[k][i] = tensors.apart(first + i, cells[k][i], at, region);
+            }
         }
-    }
-    let (mut pairs, mut areas) = ([[0.0; BLOCK]; 4], [0.0; BLOCK]);
-    for i in 0..BLOCK {
-        for [k, across] in [[0, 1], [1, 0], [2, 3], [3, 2]] {
-            // One for both where the other is missing; the root of none is no number.
-            let square = if squares[k][i] < 0.0 { squares[across][i] } else { squares[k][i] };
-            pairs[k][i] = square.sqrt() / steps[i];
+        let (mut pairs, mut areas) = ([[0.0; BLOCK]; 4], [0.0; BLOCK]);
+        for i in 0..BLOCK {
+            for [k, across] in [[0, 1], [1, 0], [2, 3], [3, 2]] {
+                // One for both where the other is missing; the root of none is no number.
+                let square = if squares[k][i] < 0.0 { squares[across][i] } else { squares[k][i] };
+                pairs[k][i] = square.sqrt() / steps[i];
+            }
+            let jet = run.jets.get(i);
+            areas[i] = if jet.is_regular() { jet.area() } else { 0.0 };
         }
-        let jet = run.jets.get(i);
-        areas[i] = if jet.is_regular() { jet.area() } else { 0.0 };
-    }
-    for i in 0..BLOCK {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|k| pairs[k][i]);
-        moments[i] = Moments::of_pairs([a, b], [c, d], areas[i]);
+        for i in 0..BLOCK {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| pairs[k][i]);
+            moments[i] = Moments::of_pairs([a, b], [c, d], areas[i]);
+        }
     }
 }
 

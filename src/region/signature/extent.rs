@@ -2,9 +2,8 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use multiversion::multiversion;
-
 use super::cut::{Run, Sum};
+use crate::linalg::simd::Kernel;
 use crate::metric::PLANE_BEND;
 use crate::surface::{BLOCK, Forms};
 
@@ -50,18 +49,24 @@ impl Sum for Extent {
 }
 
 /// What each node adds.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-pub(super) fn extents(run: &Run<'_>, extents: &mut [Extent; BLOCK]) {
-    for i in 0..BLOCK {
-        let jet = run.jets.get(i);
-        let Forms { mean, gaussian, .. } = jet.forms();
-        let area = if jet.is_regular() { jet.area() } else { 0.0 };
-        let square = area * (2.0 * mean * mean - gaussian);
-        let squared_curvature = if area > 0.0 { square } else { 0.0 };
-        extents[i] = Extent { area, squared_curvature };
+pub(super) struct Extents<'a> {
+    pub(super) run: &'a Run<'a>,
+    pub(super) extents: &'a mut [Extent; BLOCK],
+}
+
+impl Kernel for Extents<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { run, extents } = self;
+        for i in 0..BLOCK {
+            let jet = run.jets.get(i);
+            let Forms { mean, gaussian, .. } = jet.forms();
+            let area = if jet.is_regular() { jet.area() } else { 0.0 };
+            let square = area * (2.0 * mean * mean - gaussian);
+            let squared_curvature = if area > 0.0 { square } else { 0.0 };
+            extents[i] = Extent { area, squared_curvature };
+        }
     }
 }

@@ -17,12 +17,13 @@ mod tensors;
 use serde::Serialize;
 
 use self::cut::Cut;
-use self::differences::{along_grid, along_surface};
-use self::extent::{Extent, Size, extents};
+use self::differences::{AlongSurface, along_grid};
+use self::extent::{Extent, Extents, Size};
 use self::moments::{Moments, eigenvalues};
 use self::tensors::Tensors;
 use crate::control::Control;
 use crate::error::{Error, Result};
+use crate::linalg::simd;
 use crate::surface::ParametricSurface;
 
 /// Eigenvalues of the covariance of the neighbour differences over a region, largest first, 0 or more.
@@ -96,10 +97,13 @@ pub fn signatures(
         return Err(Error::usage(format!("label {} is larger than there are nodes", regions - 1)));
     }
     let cut = Cut { surface, cols, rows, periodic: surface.periodic(), labels, regions };
-    let sizes: Vec<_> = cut.sums(control, extents)?.iter().map(Extent::size).collect();
+    let extents = cut.sums(control, |run, extents| simd::dispatch(Extents { run, extents }))?;
+    let sizes: Vec<_> = extents.iter().map(Extent::size).collect();
     let tensors = Tensors::new(&cut, &sizes, control)?;
     let sums = cut.sums(control, |run, moments| match neighbours {
-        Neighbours::Surface => along_surface(&tensors, &sizes, run, moments),
+        Neighbours::Surface => {
+            simd::dispatch(AlongSurface { tensors: &tensors, sizes: &sizes, run, moments });
+        }
         Neighbours::Grid => along_grid(&tensors, &sizes, run, moments),
     })?;
     let signature = |(sum, size): (&Moments, &Size)| Signature {

@@ -3,13 +3,14 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use glam::DVec2;
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::cut::{Cut, Run};
 use super::extent::Size;
 use crate::control::Control;
 use crate::error::Result;
+use crate::linalg::bilinear::{CORNERS, corner_weights};
+use crate::linalg::simd::{self, Kernel};
 use crate::metric::of_surface;
 use crate::surface::SurfaceJet;
 use crate::surface::{BLOCK, Lanes};
@@ -50,7 +51,8 @@ impl<'a> Tensors<'a> {
             cut.visit(band * BLOCK, control, |run| {
                 let deltas = run.of_regions(|region| sizes[region].delta);
                 let first = run.node[1] % BLOCK * cut.cols + run.node[0];
-                curvature_tensors(run, &deltas, &mut of[first..][..run.labels.len()]);
+                let tensors = &mut of[first..][..run.labels.len()];
+                simd::dispatch(CurvatureTensors { run, deltas: &deltas, tensors });
             });
         });
         control.check()?;
@@ -99,7 +101,7 @@ impl<'a> Tensors<'a> {
         let (cell, is_cell) = (cell as usize, cell >= 0.0);
         if is_cell && self.inner[cell] && self.cut.labels[cell] == Some(region) {
             let (a, b) = (&self.of[cell..][..2], &self.of[cell + self.cut.cols..][..2]);
-            let (here, [p, q, r, s]) = (&self.of[node], weights(at - at.floor()));
+            let (here, [p, q, r, s]) = (&self.of[node], corner_weights(at - at.floor()));
             let mut squares = [0.0; 6];
             for k in 0..6 {
                 let there = (p * a[0][k] + q * a[1][k]) + (r * b[0][k] + s * b[1][k]);
@@ -121,9 +123,9 @@ impl<'a> Tensors<'a> {
             return None;
         }
         let (col, row) = (low.x as isize, low.y as isize);
-        let weights = weights(at - low);
+        let weights = corner_weights(at - low);
         let mut sum = [0.0; 6];
-        for ((i, j), weight) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().zip(weights) {
+        for ((i, j), weight) in CORNERS.into_iter().zip(weights) {
             if weight > 0.0 {
                 let tensor = self.at(col + i, row + j, region)?;
                 sum.iter_mut().zip(tensor).for_each(|(sum, c)| *sum += weight * c);
@@ -136,29 +138,30 @@ impl<'a> Tensors<'a> {
 /// What is not there: a place, or the square of a difference.
 pub(super) const MISSING: f64 = -1.0;
 
-/// Bilinear weights of the corners of a cell.
-#[inline(always)]
-fn weights(DVec2 { x: u, y: v }: DVec2) -> [f64; 4] {
-    [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
+/// `C` at the nodes of a run with the `δ` of each.
+struct CurvatureTensors<'a> {
+    run: &'a Run<'a>,
+    deltas: &'a Lanes,
+    tensors: &'a mut [Tensor],
 }
 
-/// `C` at the nodes of a run with the `δ` of each.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn curvature_tensors(run: &Run<'_>, deltas: &Lanes, tensors: &mut [Tensor]) {
-    let mut lanes = [[0.0; BLOCK]; 6];
-    for i in 0..BLOCK {
-        let tensor = curvature_tensor(&run.jets.get(i), deltas[i]);
-        for k in 0..6 {
-            lanes[k][i] = tensor[k];
+impl Kernel for CurvatureTensors<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { run, deltas, tensors } = self;
+        let mut lanes = [[0.0; BLOCK]; 6];
+        for i in 0..BLOCK {
+            let tensor = curvature_tensor(&run.jets.get(i), deltas[i]);
+            for k in 0..6 {
+                lanes[k][i] = tensor[k];
+            }
         }
-    }
-    for (i, tensor) in tensors.iter_mut().enumerate().take(BLOCK) {
-        for k in 0..6 {
-            tensor[k] = lanes[k][i];
+        for (i, tensor) in tensors.iter_mut().enumerate().take(BLOCK) {
+            for k in 0..6 {
+                tensor[k] = lanes[k][i];
+            }
         }
     }
 }
@@ -198,7 +201,8 @@ mod tests {
         jets.load(&plain);
         let run = Run { node: [0; 2], labels: &[], jets };
         let mut tensors = [[0.0; 6]; BLOCK];
-        curvature_tensors(&run, &[0.3; BLOCK], &mut tensors);
+        let deltas = &[0.3; BLOCK];
+        simd::dispatch(CurvatureTensors { run: &run, deltas, tensors: &mut tensors });
         for (tensor, jet) in tensors.iter().zip(&plain) {
             assert_eq!(*tensor, curvature_tensor(jet, 0.3));
         }

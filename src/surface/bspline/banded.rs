@@ -1,8 +1,7 @@
 //! Symmetric positive definite band matrices: factored once, solved for many right-hand sides.
 
-use multiversion::multiversion;
-
 use super::basis::SUPPORT;
+use crate::linalg::simd::{self, Kernel};
 
 /// A symmetric band matrix; `rows[i][d]` is the entry at `(i, i − d)`.
 #[derive(Clone, Debug)]
@@ -73,10 +72,11 @@ impl Banded {
 impl Ldl {
     /// Solves `A X = B` in place for `W` right-hand sides side by side.
     pub(in crate::surface) fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
+        let lower = &self.lower;
         match self.band {
-            3 => substitute::<3, W>(&self.lower, x),
-            5 => substitute::<5, W>(&self.lower, x),
-            _ => substitute::<{ SUPPORT - 1 }, W>(&self.lower, x),
+            3 => simd::dispatch(Substitute::<3, W> { lower, x }),
+            5 => simd::dispatch(Substitute::<5, W> { lower, x }),
+            _ => simd::dispatch(Substitute::<{ SUPPORT - 1 }, W> { lower, x }),
         }
     }
 
@@ -101,29 +101,35 @@ impl Ldl {
 }
 
 /// Solves `L D Lᵀ X = B` in place, forward and back.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn substitute<const BAND: usize, const W: usize>(lower: &[[f64; SUPPORT]], x: &mut [[f64; W]]) {
-    let n = x.len();
-    for i in 1..n {
-        let mut sum = x[i];
-        for d in 1..=BAND.min(i) {
-            subtract(&mut sum, lower[i][d], &x[i - d]);
+struct Substitute<'a, const BAND: usize, const W: usize> {
+    lower: &'a [[f64; SUPPORT]],
+    x: &'a mut [[f64; W]],
+}
+
+impl<const BAND: usize, const W: usize> Kernel for Substitute<'_, BAND, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { lower, x } = self;
+        let n = x.len();
+        for i in 1..n {
+            let mut sum = x[i];
+            for d in 1..=BAND.min(i) {
+                subtract(&mut sum, lower[i][d], &x[i - d]);
+            }
+            x[i] = sum;
         }
-        x[i] = sum;
-    }
-    for i in (0..n).rev() {
-        let mut sum = x[i];
-        for value in &mut sum {
-            *value *= lower[i][0];
+        for i in (0..n).rev() {
+            let mut sum = x[i];
+            for value in &mut sum {
+                *value *= lower[i][0];
+            }
+            for d in 1..=BAND.min(n - 1 - i) {
+                subtract(&mut sum, lower[i + d][d], &x[i + d]);
+            }
+            x[i] = sum;
         }
-        for d in 1..=BAND.min(n - 1 - i) {
-            subtract(&mut sum, lower[i + d][d], &x[i + d]);
-        }
-        x[i] = sum;
     }
 }
 

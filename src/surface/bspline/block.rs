@@ -6,10 +6,10 @@
 use std::ops::Range;
 
 use glam::DVec2;
-use multiversion::multiversion;
 
 use super::basis::{Local, SUPPORT};
 use super::fit::{Axis, Fit, dot};
+use crate::linalg::simd::{self, Kernel};
 use crate::surface::HeightJet;
 
 /// Side of a block in nodes.
@@ -78,47 +78,51 @@ impl Fit {
         let lines = top.start * width..(bottom.start + support) * width;
         let lines = &self.coefficients[lines];
         if self.x.uniform.contains(&col) && self.x.uniform.contains(&(col + BLOCK - 1)) {
-            let node = &self.x.nodes[col];
+            let (node, contracted) = (&self.x.nodes[col], &mut jets.lines);
             match self.x.basis.support() {
-                4 => contract_uniform::<4>(lines, width, node, &mut jets.lines),
-                _ => contract_uniform::<SUPPORT>(lines, width, node, &mut jets.lines),
+                4 => simd::dispatch(ContractUniform::<4> { lines, width, node, contracted }),
+                _ => simd::dispatch(ContractUniform::<SUPPORT> { lines, width, node, contracted }),
             }
         } else {
             contract_any(lines, &self.x, col, &mut jets.lines);
         }
         for (i, (node, per_metre)) in nodes.iter().zip(&per_metre[rows]).enumerate() {
             let lines = node.start - top.start..node.start - top.start + support;
-            row_jets(lines, node, *per_metre, i, jets);
+            let per_metre = *per_metre;
+            simd::dispatch(RowJets { lines, node, per_metre, row: i, jets });
         }
     }
 }
 
 /// Contracts lines of `width` coefficients at nodes that all have the weights of the first, `node`, each one
 /// coefficient further on.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn contract_uniform<const N: usize>(
-    lines: &[f64],
+struct ContractUniform<'a, const N: usize> {
+    lines: &'a [f64],
     width: usize,
-    node: &Local,
-    contracted: &mut [Contracted; LINES],
-) {
-    for (line, contracted) in lines.chunks_exact(width).zip(contracted) {
-        let window = &line[node.start..node.start + BLOCK + N - 1];
-        let mut sums = [[0.0; BLOCK]; 3];
-        for k in 0..N {
-            let coefficients = &window[k..k + BLOCK];
-            for (order, sum) in sums.iter_mut().enumerate() {
-                let weight = node.weights[order][k];
-                for i in 0..BLOCK {
-                    sum[i] += weight * coefficients[i];
+    node: &'a Local,
+    contracted: &'a mut [Contracted; LINES],
+}
+
+impl<const N: usize> Kernel for ContractUniform<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { lines, width, node, contracted } = self;
+        for (line, contracted) in lines.chunks_exact(width).zip(contracted) {
+            let window = &line[node.start..node.start + BLOCK + N - 1];
+            let mut sums = [[0.0; BLOCK]; 3];
+            for k in 0..N {
+                let coefficients = &window[k..k + BLOCK];
+                for (order, sum) in sums.iter_mut().enumerate() {
+                    let weight = node.weights[order][k];
+                    for i in 0..BLOCK {
+                        sum[i] += weight * coefficients[i];
+                    }
                 }
             }
+            *contracted = sums;
         }
-        *contracted = sums;
     }
 }
 
@@ -136,24 +140,34 @@ fn contract_any(lines: &[f64], axis: &Axis, col: usize, contracted: &mut [Contra
 
 /// Row `row` of a block, from the contracted `lines` that bear on it. Derivatives per node become those along
 /// east and north: `∂x = ∂c/Δx`, `∂y = −∂r/Δy`.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn row_jets(lines: Range<usize>, node: &Local, per_metre: DVec2, row: usize, jets: &mut JetBlock) {
-    let DVec2 { x, y } = per_metre;
-    let [value, first, second, _] = &node.weights;
-    let mut sums = [[0.0; BLOCK]; 6];
-    for (k, [v, vx, vxx]) in jets.lines[lines].iter().enumerate() {
-        accumulate(&mut sums[0], value[k], v);
-        accumulate(&mut sums[1], value[k] * x, vx);
-        accumulate(&mut sums[2], first[k] * -y, v);
-        accumulate(&mut sums[3], value[k] * x * x, vxx);
-        accumulate(&mut sums[4], first[k] * -y * x, vx);
-        accumulate(&mut sums[5], second[k] * y * y, v);
+struct RowJets<'a> {
+    lines: Range<usize>,
+    node: &'a Local,
+    per_metre: DVec2,
+    row: usize,
+    jets: &'a mut JetBlock,
+}
+
+impl Kernel for RowJets<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { lines, node, per_metre, row, jets } = self;
+        let DVec2 { x, y } = per_metre;
+        let [value, first, second, _] = &node.weights;
+        let mut sums = [[0.0; BLOCK]; 6];
+        for (k, [v, vx, vxx]) in jets.lines[lines].iter().enumerate() {
+            accumulate(&mut sums[0], value[k], v);
+            accumulate(&mut sums[1], value[k] * x, vx);
+            accumulate(&mut sums[2], first[k] * -y, v);
+            accumulate(&mut sums[3], value[k] * x * x, vxx);
+            accumulate(&mut sums[4], first[k] * -y * x, vx);
+            accumulate(&mut sums[5], second[k] * y * y, v);
+        }
+        [jets.z[row], jets.zx[row], jets.zy[row], jets.zxx[row], jets.zxy[row], jets.zyy[row]] =
+            sums;
     }
-    [jets.z[row], jets.zx[row], jets.zy[row], jets.zxx[row], jets.zxy[row], jets.zyy[row]] = sums;
 }
 
 #[inline(always)]

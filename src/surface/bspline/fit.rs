@@ -28,7 +28,6 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use glam::DVec2;
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::banded::{Banded, Ldl};
@@ -37,6 +36,7 @@ use super::knots::Plan;
 use crate::control::Control;
 use crate::error::Result;
 use crate::grid::GridFrame;
+use crate::linalg::simd::{self, Kernel};
 
 /// Name of the stage in progress reports.
 const STAGE: &str = "fitting surface";
@@ -145,12 +145,13 @@ impl Axis {
 
     /// Right-hand side of the normal equations: `Σ_i v_i z_i`.
     fn project<const W: usize>(&self, heights: &[[f64; W]]) -> Vec<[f64; W]> {
+        let (nodes, coefficients) = (&self.nodes, self.basis.len());
         // The weights beyond a narrow grid's support are 0, but what they are added to must exist.
         let mut sums = match self.basis.support() {
-            4 => project::<4, W>(&self.nodes, heights, self.basis.len()),
-            _ => project::<SUPPORT, W>(&self.nodes, heights, self.basis.len()),
+            4 => simd::dispatch(Project::<4, W> { nodes, heights, coefficients }),
+            _ => simd::dispatch(Project::<SUPPORT, W> { nodes, heights, coefficients }),
         };
-        sums.truncate(self.basis.len());
+        sums.truncate(coefficients);
         sums
     }
 
@@ -179,26 +180,29 @@ impl Axis {
 }
 
 /// At least `coefficients` sums `Σ_i v_i z_i` of heights with the first `N` weights at their nodes.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn project<const N: usize, const W: usize>(
-    nodes: &[Local],
-    heights: &[[f64; W]],
+struct Project<'a, const N: usize, const W: usize> {
+    nodes: &'a [Local],
+    heights: &'a [[f64; W]],
     coefficients: usize,
-) -> Vec<[f64; W]> {
-    let mut sums = vec![[0.0; W]; if coefficients > N { coefficients } else { N }];
-    for (node, z) in nodes.iter().zip(heights) {
-        let sums = &mut sums[node.start..node.start + N];
-        for (sum, weight) in sums.iter_mut().zip(&node.weights[0]) {
-            for i in 0..W {
-                sum[i] += weight * z[i];
+}
+
+impl<const N: usize, const W: usize> Kernel for Project<'_, N, W> {
+    type Output = Vec<[f64; W]>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { nodes, heights, coefficients } = self;
+        let mut sums = vec![[0.0; W]; if coefficients > N { coefficients } else { N }];
+        for (node, z) in nodes.iter().zip(heights) {
+            let sums = &mut sums[node.start..node.start + N];
+            for (sum, weight) in sums.iter_mut().zip(&node.weights[0]) {
+                for i in 0..W {
+                    sum[i] += weight * z[i];
+                }
             }
         }
+        sums
     }
-    sums
 }
 
 /// Coefficients of a tensor-product spline, row-major, and its two axes.

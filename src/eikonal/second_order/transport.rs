@@ -2,22 +2,21 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use multiversion::multiversion;
-
 use super::super::board::Board;
 use super::super::crew;
 use super::super::field::{AREA, SIDE, Tiling};
 use super::super::queue::{Job, Queue};
 use super::super::sides::{ITSELF, neighbours, opposite};
-use super::super::tile::transpose::mirror_block;
-use super::super::tile::{ALL, Block, Lines};
+use super::super::tile::transpose::transpose_block;
+use super::super::tile::{ALL, Block, LineMask};
 use super::super::tiles::{Values, WINDOW_CELLS};
+use super::domain::Domain;
 use super::feet::{self, BEFORE, BEHIND, Feet, Line};
-use super::patch::Patch;
-use super::triangle::Triangle;
+use super::triangle::LaneTriangle;
 use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::lanes::{choose, lanes};
+use crate::linalg::simd::{self, Kernel};
 
 /// Sweeps over a tile before it goes back into the queue, and times it may come back.
 const MOST_SWEEPS: usize = 40;
@@ -27,7 +26,7 @@ const MOST_ACTIVATIONS: u32 = 40;
 #[derive(Clone, Copy)]
 struct Outcome {
     settled: bool,
-    /// The neighbours beside which something changed, one bit each as in [`RING`](super::super::stencil::ring::RING).
+    /// The neighbours beside which something changed, one bit each as in [`RING`](crate::eikonal::stencil::ring::RING).
     changed: u8,
 }
 
@@ -41,16 +40,16 @@ impl Outcome {
     }
 }
 
-/// Solves `e = (1−θ) e(a) + θ e(b) + ρ` in a patch, tiles in the given `order`, that of their least distance; also the tiles
-/// beyond the patch beside which `e` changed.
+/// Solves `e = (1−θ) e(a) + θ e(b) + ρ` in a domain, tiles in the given `order`, that of their least distance; also the tiles
+/// beyond the domain beside which `e` changed.
 pub(super) fn carry(
-    patch: &Patch<'_>,
+    domain: &Domain<'_>,
     order: &[u32],
     e: Vec<[f32; AREA]>,
     tolerance: f32,
     control: &Control,
 ) -> Result<(Vec<[f32; AREA]>, Vec<usize>)> {
-    let Patch { solution, keys, .. } = patch;
+    let Domain { solution, keys, .. } = domain;
     let tiling = solution.field.tiling;
     let tiles = tiling.tiles();
     let window = WINDOW_CELLS * solution.field.mean_step;
@@ -62,7 +61,7 @@ pub(super) fn carry(
     let mut queue = Queue::new(tiles);
     let work = |_: &mut (), job: u64| {
         let tile = Job::from_bits(job).tile as usize;
-        let outcome = match patch.feet(tile) {
+        let outcome = match domain.feet(tile) {
             Some((feet, _)) => carry_tile(&tiling, feet, &e, tile, tolerance),
             None => Outcome { settled: true, changed: 0 },
         };
@@ -86,7 +85,7 @@ pub(super) fn carry(
                 if outcome.changed & 1 << side == 0 {
                     continue;
                 }
-                match patch.feet(n) {
+                match domain.feet(n) {
                     Some((_, reads)) if reads & 1 << opposite(side) != 0 => wake(n),
                     Some(_) => {}
                     None => beyond.push(n),
@@ -108,27 +107,45 @@ pub(super) fn carry(
     Ok((e.into_values().tiles, beyond))
 }
 
-/// Sweeps the correction through a tile until it stands still.
+/// Carries the correction through a tile until it converges.
 fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
     let mut block = [[0.0; SIDE + 2]; SIDE + 2];
     e.load(tile, &mut block);
-    if feet.by_columns {
-        mirror_block(&mut block);
-    }
-    let mut descending = feet.descending;
-    let mut sweeps = 0;
-    let mut dirty = ALL;
-    while dirty != 0 && sweeps < MOST_SWEEPS {
-        dirty = sweep(&mut block, feet, tolerance, descending, dirty);
-        descending = !descending;
-        sweeps += 1;
-    }
-    if feet.by_columns {
-        mirror_block(&mut block);
-    }
+    let settled = simd::dispatch(Carry { block: &mut block, feet, tolerance });
     let changed = changed_sides(tiling, e, tile, &block, tolerance);
     e.store(tile, &block);
-    Outcome { settled: dirty == 0, changed }
+    Outcome { settled, changed }
+}
+
+/// Sweeps the correction through a tile; comes to whether it converges.
+struct Carry<'a> {
+    block: &'a mut Block,
+    feet: &'a Feet,
+    tolerance: f32,
+}
+
+impl Kernel for Carry<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Self { block, feet, tolerance } = self;
+        if feet.by_columns {
+            transpose_block(block);
+        }
+        let mut descending = feet.descending;
+        let mut sweeps = 0;
+        let mut dirty = ALL;
+        while dirty != 0 && sweeps < MOST_SWEEPS {
+            dirty = sweep(block, feet, tolerance, descending, dirty);
+            descending = !descending;
+            sweeps += 1;
+        }
+        if feet.by_columns {
+            transpose_block(block);
+        }
+        dirty == 0
+    }
 }
 
 /// The sides, as in [`Outcome`], on which the block differs from the board by more than `tolerance`.
@@ -152,18 +169,14 @@ fn changed_sides(tiling: &Tiling, e: &Board, tile: usize, block: &Block, toleran
 }
 
 /// One sweep over the lines in `dirty`; those that read what changed since by more than `tolerance`.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
+#[inline(always)]
 fn sweep(
     block: &mut Block,
     feet: &Feet,
     tolerance: f32,
     descending: bool,
-    mut dirty: Lines,
-) -> Lines {
+    mut dirty: LineMask,
+) -> LineMask {
     for step in 0..SIDE {
         let row = if descending { SIDE - 1 - step } else { step };
         if dirty & 1 << row == 0 {
@@ -202,8 +215,8 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance
     // What comes from the lines beside, and the shares of the neighbours east and west in the line itself.
     let (mut beside, mut from_east, mut from_west) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
-        let triangle = Triangle::from_bits(bits[i]);
-        let moves = bits[i] & Triangle::NONE == 0;
+        let triangle = LaneTriangle::from_bits(bits[i]);
+        let moves = bits[i] & LaneTriangle::NONE == 0;
         let [b, _] = triangle.diagonals([0.0, se[i], 0.0, sw[i], 0.0, nw[i], 0.0, ne[i]]);
         let across = triangle.negative.choose(n[i], s[i]);
         let own = 1.0 - theta[i];

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! with the metric by the trapezoidal rule along the step, `w = g − g0` curved between the two by its limited
-//! second difference `S`, and the cone `g0` (see [`mod@super::cone`]) exact. What the functional says more than
+//! second difference `S`, and the cone `g0` (see [`mod@super::stencil::factoring`]) exact. What the functional says more than
 //! the value itself, `ρ = F − g`, travels with the front: the correction solves the linear equation
 //!
 //! ```text
@@ -20,17 +20,17 @@
 //! the least point of its functional, so that an error in it counts only squared. A second round with `g + e` brings
 //! most of what is left.
 
+mod domain;
 mod feet;
 mod functional;
-mod patch;
-mod strip;
+mod halo;
 mod transport;
 mod triangle;
 
 use rayon::prelude::*;
 
-use self::patch::Patch;
-use super::cone::Cones;
+use self::domain::Domain;
+use super::factors::Factors;
 use super::field::{AREA, TensorField};
 use super::source::Seeds;
 use super::stencil::UNREACHED;
@@ -49,7 +49,7 @@ const TOLERANCE_CELLS: [f32; 2] = [1e-4, 1e-5];
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FirstOrder<'a> {
     pub(super) field: &'a TensorField,
-    pub(super) cones: &'a Cones,
+    pub(super) factors: &'a Factors,
     pub(super) values: &'a Values,
     pub(super) seeds: &'a [Option<Box<Seeds>>],
 }
@@ -66,8 +66,8 @@ impl Correction {
     pub(super) fn new(solution: &FirstOrder<'_>, control: &Control) -> Result<Self> {
         let tiles = solution.values.tiles.len();
         let nothing = || vec![[0.0; AREA]; tiles];
-        let patch = Patch::around(solution, &vec![true; tiles]);
-        Self::in_two_rounds(patch, nothing(), nothing(), control)
+        let domain = Domain::around(solution, &vec![true; tiles]);
+        Self::in_two_rounds(domain, nothing(), nothing(), control)
     }
 
     /// The correction after an edit in these tiles, from that before. What is not downstream of them stays.
@@ -89,23 +89,23 @@ impl Correction {
                 }
             }
         });
-        Self::in_two_rounds(Patch::around(solution, changed), first, second, control)
+        Self::in_two_rounds(Domain::around(solution, changed), first, second, control)
     }
 
-    /// Corrects the patch, and what the correction is carried to, from what the rounds brought before.
+    /// Corrects the domain, and what the correction is carried to, from what the rounds brought before.
     fn in_two_rounds(
-        mut patch: Patch<'_>,
+        mut domain: Domain<'_>,
         first: Vec<[f32; AREA]>,
         second: Vec<[f32; AREA]>,
         control: &Control,
     ) -> Result<Self> {
         control.report("correcting distance", 0.0);
-        let first = patch.round(first, None, TOLERANCE_CELLS[0], control)?;
+        let first = domain.round(first, None, TOLERANCE_CELLS[0], control)?;
         control.report("correcting distance", 0.5);
-        patch.widen();
-        let mut total = patch.round(second, Some(&first), TOLERANCE_CELLS[1], control)?;
+        domain.widen();
+        let mut total = domain.round(second, Some(&first), TOLERANCE_CELLS[1], control)?;
         control.report("correcting distance", 1.0);
-        let values = &patch.solution.values.tiles;
+        let values = &domain.solution.values.tiles;
         total.par_iter_mut().zip(&first).zip(values).for_each(|((total, first), values)| {
             for i in 0..AREA {
                 // On ground so rough that the transport does not settle no distance is to be negative either.

@@ -94,12 +94,12 @@ pub(super) struct Foot {
 }
 
 impl Foot {
-    /// `θ` and `ρ`.
+    /// `θ` after a step of Newton's method, and `ρ` there.
     #[inline(always)]
-    pub(super) fn minimise<const IN_CONE: bool, const NEWTON_STEPS: usize>(self) -> (f32, f32) {
+    pub(super) fn minimise<const IS_FACTORED: bool>(self) -> (f32, f32) {
         let Self { rise: [ra, rb, rc, rd], slope, here, cone, known, .. } = self;
         let (mut wa, mut wb, mut wc, mut wd) = (ra, rb, rc, rd);
-        if IN_CONE {
+        if IS_FACTORED {
             wa -= cone.rise(0.0);
             wb -= cone.rise(1.0);
             wc -= cone.rise(-1.0);
@@ -124,24 +124,22 @@ impl Foot {
         let steep = here.2 * greatest(here.2 - d * d, 1e-12 * here.2);
         let phi = -d * across * inverse_root(greatest(across * steep, 1e-30));
         let first_order = phi - middle;
-        let mut t = greatest(lo, least(hi, choose(known >= 0.0, known, first_order)));
-        for _ in 0..NEWTON_STEPS {
-            let ([_, p0, h0], [va, pa, ha], [vb, pb, hb]) = (here.jet(t), ca.jet(t), cb.jet(t));
-            let (mut pc, mut hc) = (0.0, 0.0);
-            if IN_CONE {
-                let [_, first, second] = far.jet(t);
-                (pc, hc) = (cone.on * first, cone.on * second);
-            }
-            let first = pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
-                + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
-            let second = hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
-            let step = choose(second > 1e-6, first / second, 0.0);
-            t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
+        let t = greatest(lo, least(hi, choose(known >= 0.0, known, first_order)));
+        let ([_, p0, h0], [va, pa, ha], [vb, pb, hb]) = (here.jet(t), ca.jet(t), cb.jet(t));
+        let (mut pc, mut hc) = (0.0, 0.0);
+        if IS_FACTORED {
+            let [_, first, second] = far.jet(t);
+            (pc, hc) = (cone.on * first, cone.on * second);
         }
+        let first = pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
+            + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
+        let second = hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
+        let step = choose(second > 1e-6, first / second, 0.0);
+        let t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
         let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
         let mut rho = base + t * rise + length - bend;
-        if IN_CONE {
+        if IS_FACTORED {
             rho += cone.rise(t);
         }
         (t, rho)

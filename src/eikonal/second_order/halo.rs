@@ -2,11 +2,8 @@
 
 use super::super::field::{AREA, SIDE, Tiling};
 use super::super::sides::neighbour;
-use super::super::stencil::ring::RING;
-use crate::linalg::lanes::lanes;
-
-/// A value of each node of a row of a tile.
-pub(super) type Lanes = [f32; SIDE];
+use crate::eikonal::stencil::ring::rings;
+use crate::linalg::lanes::{Lanes, lanes};
 
 /// Nodes around the tiles that the functional looks at.
 pub(super) const MARGIN: usize = 2;
@@ -76,25 +73,9 @@ pub(super) fn seen(strip: &Strip, (from, row): (usize, usize), (dx, dy): (i32, i
     lanes(line, (from as i32 + dx + MARGIN as i32) as usize)
 }
 
-/// The values around the nodes of a row, in the order of [`RING`].
+/// The rings of the nodes of a row.
 #[inline(always)]
-pub(super) fn around(strip: &Strip, at: (usize, usize)) -> [Lanes; 8] {
-    // Not `array::map`: what is not inlined here is not compiled for the wide registers.
-    let [e, se, s, sw, w, nw, n, ne] = RING;
-    [
-        seen(strip, at, e),
-        seen(strip, at, se),
-        seen(strip, at, s),
-        seen(strip, at, sw),
-        seen(strip, at, w),
-        seen(strip, at, nw),
-        seen(strip, at, n),
-        seen(strip, at, ne),
-    ]
-}
-
-/// The values around node `i` of a row.
-#[inline(always)]
-pub(super) fn around_node([e, se, s, sw, w, nw, n, ne]: &[Lanes; 8], i: usize) -> [f32; 8] {
-    [e[i], se[i], s[i], sw[i], w[i], nw[i], n[i], ne[i]]
+pub(super) fn rings_of(strip: &Strip, (from, row): (usize, usize)) -> [Lanes; 8] {
+    let above = row + MARGIN - 1;
+    rings([&strip[above], &strip[above + 1], &strip[above + 2]], from + MARGIN)
 }

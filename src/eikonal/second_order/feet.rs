@@ -2,26 +2,24 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use multiversion::multiversion;
-
-use super::super::field::{AREA, SIDE};
-use super::super::stencil::UNREACHED;
-use super::super::stencil::ring::RING;
-use super::super::tile::Tile;
-use super::super::tile::coefficients::{LaneLimits, prepare_shifts};
-use super::super::tile::kernel::How;
-use super::super::tile::transpose::mirror;
 use super::FirstOrder;
 use super::functional::{ConeAt, Foot};
-use super::strip::{Lanes, MARGIN, Strip, WIDE, around, around_node, fill, seen};
-use super::triangle::{Triangle, choose};
-use crate::linalg::lanes::lanes;
+use super::halo::{MARGIN, Strip, WIDE, fill, rings_of, seen};
+use super::triangle::{LaneTriangle, choose};
+use crate::eikonal::field::{AREA, SIDE};
+use crate::eikonal::stencil::UNREACHED;
+use crate::eikonal::stencil::ring::{RING, ring_of};
+use crate::eikonal::tile::Tile;
+use crate::eikonal::tile::coefficients::{LaneLimits, factoring_terms, line_tensors};
+use crate::eikonal::tile::transpose::transpose;
+use crate::linalg::lanes::{Lanes, lanes};
+use crate::linalg::simd::{self, Kernel};
 
 /// Where the values of a tile's nodes come from, and what the functional of second order adds there; by rows or, where
 /// `by_columns`, by columns.
 #[derive(Clone)]
 pub(super) struct Feet {
-    /// Bits of a [`Triangle`] and above them the share of the diagonal neighbour, in [`SHARES`]. Transport reads all feet of a
+    /// Bits of a [`LaneTriangle`] and above them the share of the diagonal neighbour, in [`SHARES`]. Transport reads all feet of a
     /// grid, which no cache near by holds: with a number for each it took longer.
     packed: [u16; AREA],
     pub(super) rho: [f32; AREA],
@@ -72,7 +70,7 @@ impl Surroundings {
         feet: &mut [Feet],
         reads: &mut [u8],
     ) {
-        let &FirstOrder { field, cones, values, seeds } = input.solution;
+        let &FirstOrder { field, factors, values, seeds } = input.solution;
         let tiling = &field.tiling;
         let reached = |tile: usize| values.tiles[tile].iter().any(|&g| g < UNREACHED);
         let tiles = feet.len();
@@ -90,21 +88,26 @@ impl Surroundings {
         fill(xx, tiling, part, 0.0, |t| &field.tiles[t].xx);
         fill(xy, tiling, part, 0.0, |t| &field.tiles[t].xy);
         fill(det, tiling, part, 0.0, |t| &field.tiles[t].det);
-        invert(&mut self.metric);
+        simd::dispatch(Invert { metric: &mut self.metric });
+        let again = input.total.is_some();
         for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {
-            let tile = first + k;
+            let (tile, from) = (first + k, k * SIDE);
             let size = tiling.size(tile);
-            let cone = cones.of_tile(tile).map(|cone| (cone, tiling.first(tile)));
+            let factor = factors.of_tile(tile).map(|factor| (factor, tiling.first(tile)));
             let seeds = seeds[tile].as_deref();
-            let tile = Tile { tensors: &field.tiles[tile], cone, tolerance: 0.0, seeds };
-            *reads = find(self, k * SIDE, &tile, size, input.total.is_some(), feet);
+            let tile = Tile { tensors: &field.tiles[tile], factor, tolerance: 0.0, seeds };
+            let around = &*self;
+            *reads = match factor {
+                Some(_) => simd::dispatch(Find::<true> { around, from, tile, size, again, feet }),
+                None => simd::dispatch(Find::<false> { around, from, tile, size, again, feet }),
+            };
         }
     }
 }
 
 impl Feet {
     pub(super) const NONE: Self = Self {
-        packed: [Triangle::NONE as u16; AREA],
+        packed: [LaneTriangle::NONE as u16; AREA],
         rho: [0.0; AREA],
         by_columns: false,
         descending: false,
@@ -118,8 +121,8 @@ impl Feet {
         let (mut triangle, mut theta) = ([0; SIDE], [0.0; SIDE]);
         for i in 0..SIDE {
             let bits = u32::from(self.packed[place + i]);
-            triangle[i] = bits & Triangle::ALL;
-            theta[i] = (bits >> Triangle::BITS) as f32 * (1.0 / SHARES);
+            triangle[i] = bits & LaneTriangle::ALL;
+            theta[i] = (bits >> LaneTriangle::BITS) as f32 * (1.0 / SHARES);
         }
         Line { triangle, theta, rho: lanes(&self.rho, place) }
     }
@@ -132,42 +135,47 @@ impl Feet {
         for i in 0..SIDE {
             // The last bits of a number beyond 2²³ count ones: a conversion would saturate, which is not done lane by lane.
             let share = (line.theta[i] * SHARES + 8_388_608.0).to_bits() & 0xfff;
-            packed[i] = (share << Triangle::BITS | line.triangle[i]) as u16;
+            packed[i] = (share << LaneTriangle::BITS | line.triangle[i]) as u16;
         }
         self.packed[places].copy_from_slice(&packed);
     }
 
-    /// Mirrors the tile on its diagonal.
+    /// Transposes the tile.
     #[inline(always)]
-    fn mirror(&mut self) {
+    fn transpose(&mut self) {
         for row in 0..SIDE {
             for col in 0..row {
                 self.packed.swap(row * SIDE + col, col * SIDE + row);
             }
         }
-        mirror(self.rho.as_chunks_mut::<SIDE>().0, 0);
+        transpose(self.rho.as_chunks_mut::<SIDE>().0, 0);
         for bits in &mut self.packed {
-            *bits ^= Triangle::ALONG_Y as u16;
+            *bits ^= LaneTriangle::ALONG_Y as u16;
         }
     }
 }
 
-/// `M = D⁻¹` as xx, xy, yy and its determinant, 0 where closed, from `D` as xx, xy, det.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn invert([xx, xy, yy, det]: &mut [Strip; 4]) {
-    for row in MARGIN - 1..SIDE + MARGIN + 1 {
-        for i in 0..WIDE {
-            let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], yy[row][i]);
-            let (open, inverse) = (ddet > 0.0, 1.0 / (dxx * ddet));
-            let idet = dxx * inverse;
-            xx[row][i] = choose(open, (ddet + dxy * dxy) * inverse, 0.0);
-            xy[row][i] = choose(open, -dxy * idet, 0.0);
-            yy[row][i] = choose(open, dxx * idet, 0.0);
-            det[row][i] = choose(open, idet, 0.0);
+/// Makes `M = D⁻¹` as xx, xy, yy and its determinant, 0 where closed, from `D` as xx, xy, det.
+struct Invert<'a> {
+    metric: &'a mut [Strip; 4],
+}
+
+impl Kernel for Invert<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let [xx, xy, yy, det] = self.metric;
+        for row in MARGIN - 1..SIDE + MARGIN + 1 {
+            for i in 0..WIDE {
+                let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], yy[row][i]);
+                let (open, inverse) = (ddet > 0.0, 1.0 / (dxx * ddet));
+                let idet = dxx * inverse;
+                xx[row][i] = choose(open, (ddet + dxy * dxy) * inverse, 0.0);
+                xy[row][i] = choose(open, -dxy * idet, 0.0);
+                yy[row][i] = choose(open, dxx * idet, 0.0);
+                det[row][i] = choose(open, idet, 0.0);
+            }
         }
     }
 }
@@ -191,111 +199,120 @@ fn rises<const N: usize>(
     rises
 }
 
-/// Finds the feet of the tile of a size that begins at column `from`, if `again` from those of the round before; the neighbours
-/// that it reads. A function for each case: one that reads the feet in the first round too was 3 % slower.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-fn find(
-    around: &Surroundings,
+/// Finds the feet of a tile, if `again` from those of the round before; comes to the neighbours that it reads.
+struct Find<'a, const IS_FACTORED: bool> {
+    around: &'a Surroundings,
+    /// The column of the strip at which the tile begins.
     from: usize,
-    tile: &Tile<'_>,
+    tile: Tile<'a>,
     size: [usize; 2],
     again: bool,
-    feet: &mut Feet,
-) -> u8 {
-    let mut course = Course::default();
-    if again && feet.by_columns {
-        feet.mirror();
-    }
-    for row in 0..SIDE {
-        let at = (from, row);
-        let before = again.then(|| feet.line(row));
-        let line = match (tile.cone.is_some(), &before) {
-            (true, Some(before)) => find_line_again::<true>(around, at, tile, before),
-            (false, Some(before)) => find_line_again::<false>(around, at, tile, before),
-            (true, None) => find_line::<true, 1>(around, at, tile, None),
-            (false, None) => find_line::<false, 1>(around, at, tile, None),
-        };
-        course.add(row, &line);
-        feet.set_line(row, &line);
-    }
-    course.set(feet, size)
+    feet: &'a mut Feet,
 }
 
-/// The feet of a row or column of a tile: bits of a [`Triangle`], the share of the diagonal neighbour, and what the functional adds.
+impl<const IS_FACTORED: bool> Kernel for Find<'_, IS_FACTORED> {
+    type Output = u8;
+
+    #[inline(always)]
+    fn run(self) -> u8 {
+        let Self { around, from, tile, size, again, feet } = self;
+        let mut course = Course::default();
+        if again && feet.by_columns {
+            feet.transpose();
+        }
+        for row in 0..SIDE {
+            let mut line = if again { feet.line(row) } else { Line::UNKNOWN };
+            let mut steps = 1;
+            let mut moved = !again;
+            while steps > 0 {
+                let found = find_line::<IS_FACTORED>(around, (from, row), &tile, &line);
+                steps -= 1;
+                if !moved && found.is_elsewhere(&line) {
+                    // Seldom. With one step, the error near the pole of a sphere falls with order 0.9 instead of 1.3.
+                    (moved, steps, line) = (true, 2, Line::UNKNOWN);
+                } else {
+                    (moved, line) = (true, found);
+                }
+            }
+            course.add(row, &line);
+            feet.set_line(row, &line);
+        }
+        course.set(feet, size)
+    }
+}
+
+/// The feet of a row or column of a tile: bits of a [`LaneTriangle`], the share of the diagonal neighbour, and what the functional adds.
 pub(super) struct Line {
     pub(super) triangle: [u32; SIDE],
     pub(super) theta: Lanes,
     pub(super) rho: Lanes,
 }
 
-/// Finds the feet of a row of a tile from those of the round before. Where one is in another triangle now, which is seldom, the row is
-/// done without them, and with two steps: with one, the error near the pole of a sphere falls with order 0.9 instead of 1.3.
+impl Line {
+    /// No feet.
+    const UNKNOWN: Self =
+        Self { triangle: [LaneTriangle::NONE; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
+
+    /// Whether any foot is in another triangle.
+    #[inline(always)]
+    fn is_elsewhere(&self, before: &Self) -> bool {
+        let mut moved = 0;
+        for i in 0..SIDE {
+            moved |= self.triangle[i] ^ before.triangle[i];
+        }
+        moved != 0
+    }
+}
+
+/// Finds the feet of a row of a tile by a step of Newton's method: from the feet `before` that are in the same triangle, from those of first
+/// order where there are none.
 #[inline(always)]
-fn find_line_again<const IN_CONE: bool>(
-    around: &Surroundings,
+fn find_line<const IS_FACTORED: bool>(
+    Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
     at: (usize, usize),
     tile: &Tile<'_>,
     before: &Line,
 ) -> Line {
-    let line = find_line::<IN_CONE, 1>(around, at, tile, Some(before));
-    let mut moved = 0;
-    for i in 0..SIDE {
-        moved |= line.triangle[i] ^ before.triangle[i];
-    }
-    if moved == 0 { line } else { find_line::<IN_CONE, 2>(around, at, tile, None) }
-}
-
-/// Finds the feet of a row of a tile by Newton's method, starting from those `before`, if given, where the triangle is the same.
-#[inline(always)]
-fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
-    Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
-    at: (usize, usize),
-    tile: &Tile<'_>,
-    before: Option<&Line>,
-) -> Line {
     let row = at.1;
-    let mut shifts = [[0f32; SIDE]; 8];
+    let tensors = line_tensors(tile, row, false);
+    let mut terms = [[0f32; SIDE]; 8];
     let (mut m0, mut origin) = ([1.0, 0.0, 1.0], [1.0, 0.0]);
-    if let Some((cone, first)) = tile.cone {
-        let how = How { by_columns: false, descending: false };
-        prepare_shifts(tile, row, how, &mut shifts, &mut LaneLimits::default());
-        m0 = [cone.metric.xx as f32, cone.metric.xy as f32, cone.metric.yy as f32];
-        origin = [(first.x - cone.at.x) as f32, (first.y + row as f64 - cone.at.y) as f32];
+    if let Some((factor, first)) = tile.factor {
+        factoring_terms(tile, row, false, &tensors, &mut terms, &mut LaneLimits::default());
+        let m = factor.metric;
+        m0 = [m.xx as f32, m.xy as f32, m.yy as f32];
+        origin = [(first.x - factor.at.x) as f32, (first.y + row as f64 - factor.at.y) as f32];
     }
     let ring = rises(g, e, at, RING);
     // Beside the axis neighbours, two lines from that of the node, on either side.
     let ahead = rises(g, e, at, [(1, -2), (-2, 1), (-1, -2), (-2, -1)]);
     let behind = rises(g, e, at, [(1, 2), (2, 1), (-1, 2), (2, -1)]);
-    let metrics = [around(xx, at), around(xy, at), around(yy, at)];
+    let metrics = [rings_of(xx, at), rings_of(xy, at), rings_of(yy, at)];
     let own = (0, 0);
     let (xx, xy, yy) = (seen(xx, at, own), seen(xy, at, own), seen(yy, at, own));
     let (g, det) = (seen(g, at, own), seen(det, at, own));
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
-    let dets = lanes(&tile.tensors.det, row * SIDE);
+    let [_, _, dets] = tensors;
     let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
     // The triangles first: in one loop with the rest 2 % slower.
     let (mut slopes, mut on) = ([0.0; SIDE], [0.0; SIDE]);
     for i in 0..SIDE {
-        let mut shifted = around_node(&ring, i);
-        if IN_CONE {
+        let mut shifted = ring_of(&ring, i);
+        if IS_FACTORED {
             for k in 0..8 {
-                shifted[k] += shifts[k][i];
-                on[i] = choose(shifts[k][i] < 0.0, 1.0, on[i]);
+                shifted[k] += terms[k][i];
+                on[i] = choose(terms[k][i] < 0.0, 1.0, on[i]);
             }
         }
-        (line.triangle[i], slopes[i]) = Triangle::best(shifted, [xx[i], xy[i], yy[i]], det[i]);
+        (line.triangle[i], slopes[i]) = LaneTriangle::best(shifted, [xx[i], xy[i], yy[i]], det[i]);
     }
     for i in 0..SIDE {
         let bits = line.triangle[i];
-        let triangle = Triangle::from_bits(bits);
-        let (ring, here) = (around_node(&ring, i), [xx[i], xy[i], yy[i]]);
+        let triangle = LaneTriangle::from_bits(bits);
+        let (ring, here) = (ring_of(&ring, i), [xx[i], xy[i], yy[i]]);
         let far = |[e, s, w, n]: &[Lanes; 4]| triangle.side(e[i], s[i], w[i], n[i]);
         let (xx, xy, yy) =
-            (around_node(&metrics[0], i), around_node(&metrics[1], i), around_node(&metrics[2], i));
+            (ring_of(&metrics[0], i), ring_of(&metrics[1], i), ring_of(&metrics[2], i));
         let axis = [triangle.axis(xx), triangle.axis(xy), triangle.axis(yy)];
         let diagonal = |ring: [f32; 8]| triangle.diagonals(ring)[0];
         let [beside, opposite] = triangle.diagonals(ring);
@@ -315,15 +332,12 @@ fn find_line<const IN_CONE: bool, const NEWTON_STEPS: usize>(
                 triangle.mirror(m0),
                 triangle.mirror_place([origin[0] + i as f32, origin[1]]),
             ),
-            known: match before {
-                Some(line) => choose(line.triangle[i] == bits, line.theta[i], -1.0),
-                None => -1.0,
-            },
+            known: choose(before.triangle[i] == bits, before.theta[i], -1.0),
         };
-        let (theta, rho) = foot.minimise::<IN_CONE, NEWTON_STEPS>();
+        let (theta, rho) = foot.minimise::<IS_FACTORED>();
         // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
-        line.triangle[i] = if fixed { Triangle::NONE } else { bits };
+        line.triangle[i] = if fixed { LaneTriangle::NONE } else { bits };
         line.theta[i] = choose(fixed, 0.0, theta);
         line.rho[i] = choose(fixed, 0.0, rho);
     }
@@ -350,10 +364,10 @@ impl Course {
         let (triangles, thetas) = (&line.triangle, &line.theta);
         let mut reads = 0;
         for i in 0..SIDE {
-            let triangle = Triangle::from_bits(triangles[i]);
+            let triangle = LaneTriangle::from_bits(triangles[i]);
             let (negative, along_y) = (triangle.negative.is_yes(), triangle.along_y.is_yes());
             let backwards = triangle.backwards().is_yes();
-            let fixed = triangles[i] == Triangle::NONE;
+            let fixed = triangles[i] == LaneTriangle::NONE;
             // Along the axis the line of both neighbours, across it the own one, that of the diagonal neighbour, or both.
             let bit = |negative: bool| if negative { BEFORE } else { BEHIND };
             let own = if thetas[i] < 1.0 { ITSELF } else { 0 };
@@ -407,7 +421,7 @@ impl Course {
         feet.by_columns = east.abs() > south.abs();
         if feet.by_columns {
             (feet.descending, feet.reads) = (east > 0, cols);
-            feet.mirror();
+            feet.transpose();
         } else {
             (feet.descending, feet.reads) = (south > 0, self.rows);
         }
@@ -424,10 +438,10 @@ fn neighbours_read(
 ) -> u8 {
     let (east, south) = (width - 1, height - 1);
     let corner = |place: usize, falling: bool, west: bool| {
-        let bits = u32::from(feet.packed[place]) & Triangle::ALL;
-        let t = Triangle::from_bits(bits);
+        let bits = u32::from(feet.packed[place]) & LaneTriangle::ALL;
+        let t = LaneTriangle::from_bits(bits);
         let to_west = if t.along_y.is_yes() { t.backwards() } else { t.negative };
-        bits != Triangle::NONE && t.falling.is_yes() == falling && to_west.is_yes() == west
+        bits != LaneTriangle::NONE && t.falling.is_yes() == falling && to_west.is_yes() == west
     };
     let bits = [
         u32::from(cols[east]) & BEHIND != 0,

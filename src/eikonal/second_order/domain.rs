@@ -7,19 +7,19 @@ use super::super::sides::neighbours;
 use super::super::stencil::UNREACHED;
 use super::FirstOrder;
 use super::feet::{Feet, Input, Surroundings};
-use super::strip::STRIP;
+use super::halo::STRIP;
 use super::transport::carry;
 use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::lanes::least;
 
 /// Tiles, in strips of [`STRIP`] side by side, with their feet. Grows where the correction is carried beyond.
-pub(super) struct Patch<'a> {
+pub(super) struct Domain<'a> {
     pub(super) solution: &'a FirstOrder<'a>,
     /// Least distance of each tile.
     pub(super) keys: Vec<f32>,
     strips: Vec<FeetOfStrip>,
-    /// The place in `strips` of each strip of the grid, row by row; `None` if it does not belong to the patch.
+    /// The place in `strips` of each strip of the grid, row by row; `None` if it does not belong to the domain.
     places: Vec<Option<u32>>,
 }
 
@@ -28,18 +28,18 @@ struct FeetOfStrip {
     first: usize,
     tiles: usize,
     feet: [Feet; STRIP],
-    /// The neighbours that each tile reads, one bit each as in [`RING`](super::super::stencil::ring::RING).
+    /// The neighbours that each tile reads, one bit each as in [`RING`](crate::eikonal::stencil::ring::RING).
     reads: [u8; STRIP],
     /// In how many rounds they were found.
     rounds: usize,
 }
 
-impl<'a> Patch<'a> {
+impl<'a> Domain<'a> {
     /// The `changed` tiles and those that look at them.
     pub(super) fn around(solution: &'a FirstOrder<'a>, changed: &[bool]) -> Self {
         let Tiling { across, down, .. } = solution.field.tiling;
         let strips = across.div_ceil(STRIP) * down;
-        let mut patch = Self {
+        let mut domain = Self {
             solution,
             keys: solution.values.tiles.par_iter().map(least_of).collect(),
             // Moving feet to a larger place would take longer than finding some.
@@ -47,9 +47,9 @@ impl<'a> Patch<'a> {
             places: vec![None; strips],
         };
         for (tile, _) in changed.iter().enumerate().filter(|&(_, &changed)| changed) {
-            patch.add_around(tile);
+            domain.add_around(tile);
         }
-        patch
+        domain
     }
 
     /// Adds all tiles around.
@@ -88,7 +88,7 @@ impl<'a> Patch<'a> {
         (y * across.div_ceil(STRIP) + x / STRIP, x % STRIP)
     }
 
-    /// The feet of a tile and the neighbours that it reads, one bit each; `None` if it does not belong to the patch.
+    /// The feet of a tile and the neighbours that it reads, one bit each; `None` if it does not belong to the domain.
     pub(super) fn feet(&self, tile: usize) -> Option<(&Feet, u8)> {
         let (strip, place) = self.place(tile);
         let strip = &self.strips[self.places[strip]? as usize];

@@ -1,8 +1,11 @@
-//! The eight triangles around a node, mirrored onto one.
+//! The eight triangles around a node, another in each lane, mirrored onto one.
 
-use super::super::stencil::ring::pass;
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
+
 use super::functional::{Quadratic, inverse_root};
-use crate::linalg::lanes::{greatest, least};
+use crate::eikonal::stencil::ring::{TRIANGLES, Triangle, without_cut_corners};
+use crate::eikonal::stencil::segment::ClosedForm;
+use crate::linalg::lanes::greatest;
 
 /// Yes or no, as the bits of a lane: all set or none.
 ///
@@ -40,15 +43,15 @@ impl Mask {
     }
 }
 
-/// As [`Mask::choose`]: unlike the one of `update.rs` never a branch.
+/// As [`Mask::choose`]: unlike the one of `linalg::lanes` never a branch.
 #[inline(always)]
 pub(super) fn choose(yes: bool, a: f32, b: f32) -> f32 {
     Mask(0u32.wrapping_sub(u32::from(yes))).choose(a, b)
 }
 
-/// The triangle between an axis neighbour `a` and a diagonal neighbour `b` of a node.
+/// A [`Triangle`] in a lane.
 #[derive(Clone, Copy)]
-pub(super) struct Triangle {
+pub(super) struct LaneTriangle {
     /// Whether `a` lies towards smaller coordinates.
     pub(super) negative: Mask,
     /// Whether `a` lies along y.
@@ -57,7 +60,7 @@ pub(super) struct Triangle {
     pub(super) falling: Mask,
 }
 
-impl Triangle {
+impl LaneTriangle {
     const NEGATIVE: u32 = 1;
     pub(super) const ALONG_Y: u32 = 2;
     const FALLING: u32 = 4;
@@ -66,6 +69,14 @@ impl Triangle {
     /// How many bits there are, and all of them.
     pub(super) const BITS: u32 = 4;
     pub(super) const ALL: u32 = 15;
+
+    /// The bits of a triangle.
+    #[inline(always)]
+    const fn to_bits(t: Triangle) -> u32 {
+        t.negative as u32 * Self::NEGATIVE
+            | t.along_y as u32 * Self::ALONG_Y
+            | t.falling as u32 * Self::FALLING
+    }
 
     #[inline(always)]
     pub(super) fn from_bits(bits: u32) -> Self {
@@ -89,7 +100,7 @@ impl Triangle {
         along_y.choose(negative.choose(north, south), negative.choose(west, east))
     }
 
-    /// Of the values around the node in the order of [`RING`](super::super::stencil::ring::RING) that at `a`.
+    /// Of the values around the node in the order of [`RING`](crate::eikonal::stencil::ring::RING) that at `a`.
     #[inline(always)]
     pub(super) fn axis(self, ring: [f32; 8]) -> f32 {
         self.side(ring[0], ring[2], ring[4], ring[6])
@@ -118,46 +129,41 @@ impl Triangle {
     }
 
     /// The triangle that gives a node its first-order value, as bits, and the difference `g(b) − g(a)` there, from the
-    /// values around the node and `M` with its determinant. See
-    /// [`Coefficients`](super::super::tile::coefficients::Coefficients), there in terms of `D`. Roots to five digits: of two triangles
-    /// that are as good as each other either will do.
+    /// values around the node and `M` with its determinant. See [`ClosedForm`], here in terms of `M`: `D = [s β; β q]` is
+    /// `[yy −xy; −xy xx]/det M`. Roots to five digits: of two triangles that are as good as each other either will do.
     #[inline(always)]
     pub(super) fn best(ring: [f32; 8], [xx, xy, yy]: [f32; 3], det: f32) -> (u32, f32) {
         let (rising2, falling2) =
             (greatest(xx + yy + 2.0 * xy, 1e-30), greatest(xx + yy - 2.0 * xy, 1e-30));
-        let (irising, ifalling) = (inverse_root(rising2), inverse_root(falling2));
-        let (rising, falling) = (rising2 * irising, falling2 * ifalling);
-        let (ieast, isouth) = (inverse_root(xx), inverse_root(yy));
-        let (rx, ry) = (isouth * isouth, ieast * ieast);
-        // `1/s`, `det D/s²`, `β/s` and `hi` of the triangles along x and y; `β` and `hi` with the other sign if falling.
-        let x = [det * rx, det * rx * rx, -xy * rx, -xy * ieast];
-        let y = [det * ry, det * ry * ry, -xy * ry, -xy * isouth];
-        let fallen = |[i, e, beta, hi]: [f32; 4]| [i, e, -beta, -hi];
-        let (lo_x, lo_y) = (-(xy + yy) * irising, -(xy + xx) * irising);
-        let (fallen_lo_x, fallen_lo_y) = ((xy - yy) * ifalling, (xy - xx) * ifalling);
-        let [e, se, s, sw, w, nw, n, ne] = ring;
-        let (se, nw) = (pass(se, s, e), pass(nw, n, w));
-        let (ne, sw) = (pass(ne, n, e), pass(sw, s, w));
+        let (inv_rising, inv_falling) = (inverse_root(rising2), inverse_root(falling2));
+        let (rising, falling) = (rising2 * inv_rising, falling2 * inv_falling);
+        let (inv_east, inv_south) = (inverse_root(xx), inverse_root(yy));
+        let ring = without_cut_corners(ring);
         let (mut least_value, mut triangle, mut slope) = (f32::INFINITY, 0, 0.0);
-        let mut offer = |t: u32, a: f32, b: f32, lo: f32, [i, e, beta, hi]: [f32; 4], step: f32| {
-            let d = b - a;
-            let c = greatest(least(d, hi), lo);
-            let between = a + (beta * c + greatest(i - e * (c * c), 0.0).sqrt());
-            let value = choose(d < lo, b + step, between);
+        for t in TRIANGLES {
+            // aᵀMw, wᵀMw and what is 1/‖a‖ and 1/‖w‖.
+            let aw = if t.falling { -xy } else { xy };
+            let ww = if t.along_y { xx } else { yy };
+            let [inv_a, inv_w] =
+                if t.along_y { [inv_south, inv_east] } else { [inv_east, inv_south] };
+            let [step, inv_step] =
+                if t.falling { [falling, inv_falling] } else { [rising, inv_rising] };
+            let inv_ww = inv_w * inv_w;
+            let form = ClosedForm {
+                inv_s: det * inv_ww,
+                det_over_s2: det * inv_ww * inv_ww,
+                beta_over_s: -aw * inv_ww,
+                lo: -(aw + ww) * inv_step,
+                hi: -aw * inv_a,
+            };
+            let (ga, gb) = (ring[t.a], ring[t.b]);
+            let d = gb - ga;
+            let value = choose(d < form.lo, gb + step, form.through(ga, gb));
             let better = value < least_value;
             least_value = choose(better, value, least_value);
             slope = choose(better, d, slope);
-            triangle = if better { t } else { triangle };
-        };
-        let (neg, y_, fall) = (Self::NEGATIVE, Self::ALONG_Y, Self::FALLING);
-        offer(0, e, se, lo_x, x, rising);
-        offer(neg, w, nw, lo_x, x, rising);
-        offer(y_, s, se, lo_y, y, rising);
-        offer(y_ | neg, n, nw, lo_y, y, rising);
-        offer(fall, e, ne, fallen_lo_x, fallen(x), falling);
-        offer(fall | neg, w, sw, fallen_lo_x, fallen(x), falling);
-        offer(fall | y_, s, sw, fallen_lo_y, fallen(y), falling);
-        offer(fall | y_ | neg, n, ne, fallen_lo_y, fallen(y), falling);
+            triangle = if better { Self::to_bits(t) } else { triangle };
+        }
         (triangle, slope)
     }
 }
