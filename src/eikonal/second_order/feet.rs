@@ -22,7 +22,7 @@ pub(super) struct Feet {
     /// Bits of a [`LaneTriangle`] and above them the share of the diagonal neighbour, in [`SHARES`]. Transport reads all feet of a
     /// grid, which no cache near by holds: with a number for each it took longer.
     packed: [u16; AREA],
-    pub(super) rho: [f32; AREA],
+    pub(super) defect: [f32; AREA],
     /// Whether most comes along the rows, and then whether it comes from the end of the columns or rows.
     pub(super) by_columns: bool,
     pub(super) descending: bool,
@@ -108,7 +108,7 @@ impl Surroundings {
 impl Feet {
     pub(super) const NONE: Self = Self {
         packed: [LaneTriangle::NONE as u16; AREA],
-        rho: [0.0; AREA],
+        defect: [0.0; AREA],
         by_columns: false,
         descending: false,
         reads: [0; SIDE],
@@ -124,13 +124,13 @@ impl Feet {
             triangle[i] = bits & LaneTriangle::ALL;
             theta[i] = (bits >> LaneTriangle::BITS) as f32 * (1.0 / SHARES);
         }
-        Line { triangle, theta, rho: lanes(&self.rho, place) }
+        Line { triangle, theta, defect: lanes(&self.defect, place) }
     }
 
     #[inline(always)]
     fn set_line(&mut self, row: usize, line: &Line) {
         let places = row * SIDE..(row + 1) * SIDE;
-        self.rho[places.clone()].copy_from_slice(&line.rho);
+        self.defect[places.clone()].copy_from_slice(&line.defect);
         let mut packed = [0; SIDE];
         for i in 0..SIDE {
             // The last bits of a number beyond 2²³ count ones: a conversion would saturate, which is not done lane by lane.
@@ -148,7 +148,7 @@ impl Feet {
                 self.packed.swap(row * SIDE + col, col * SIDE + row);
             }
         }
-        transpose(self.rho.as_chunks_mut::<SIDE>().0, 0);
+        transpose(self.defect.as_chunks_mut::<SIDE>().0, 0);
         for bits in &mut self.packed {
             *bits ^= LaneTriangle::ALONG_Y as u16;
         }
@@ -245,13 +245,13 @@ impl<const IS_FACTORED: bool> Kernel for Find<'_, IS_FACTORED> {
 pub(super) struct Line {
     pub(super) triangle: [u32; SIDE],
     pub(super) theta: Lanes,
-    pub(super) rho: Lanes,
+    pub(super) defect: Lanes,
 }
 
 impl Line {
     /// No feet.
     const UNKNOWN: Self =
-        Self { triangle: [LaneTriangle::NONE; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
+        Self { triangle: [LaneTriangle::NONE; SIDE], theta: [0.0; SIDE], defect: [0.0; SIDE] };
 
     /// Whether any foot is in another triangle.
     #[inline(always)]
@@ -293,7 +293,7 @@ fn find_line<const IS_FACTORED: bool>(
     let (g, det) = (seen(g, at, own), seen(det, at, own));
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
     let [_, _, dets] = tensors;
-    let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], rho: [0.0; SIDE] };
+    let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], defect: [0.0; SIDE] };
     // The triangles first: in one loop with the rest 2 % slower.
     let (mut slopes, mut on) = ([0.0; SIDE], [0.0; SIDE]);
     for i in 0..SIDE {
@@ -334,12 +334,12 @@ fn find_line<const IS_FACTORED: bool>(
             ),
             known: choose(before.triangle[i] == bits, before.theta[i], -1.0),
         };
-        let (theta, rho) = foot.minimise::<IS_FACTORED>();
+        let (theta, defect) = foot.minimise::<IS_FACTORED>();
         // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
         line.triangle[i] = if fixed { LaneTriangle::NONE } else { bits };
         line.theta[i] = choose(fixed, 0.0, theta);
-        line.rho[i] = choose(fixed, 0.0, rho);
+        line.defect[i] = choose(fixed, 0.0, defect);
     }
     line
 }

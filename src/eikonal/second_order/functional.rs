@@ -94,7 +94,7 @@ pub(super) struct Foot {
 }
 
 impl Foot {
-    /// `θ` after a step of Newton's method, and `ρ` there.
+    /// `θ` after a step of Newton's method, and the defect `ρ` there.
     #[inline(always)]
     pub(super) fn minimise<const IS_FACTORED: bool>(self) -> (f32, f32) {
         let Self { rise: [ra, rb, rc, rd], slope, here, cone, known, .. } = self;
@@ -138,11 +138,11 @@ impl Foot {
         let t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
         let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
-        let mut rho = base + t * rise + length - bend;
+        let mut defect = base + t * rise + length - bend;
         if IS_FACTORED {
-            rho += cone.rise(t);
+            defect += cone.rise(t);
         }
-        (t, rho)
+        (t, defect)
     }
 }
 

@@ -10,7 +10,7 @@
 //!
 //! with the metric by the trapezoidal rule along the step, `w = g − g0` curved between the two by its limited
 //! second difference `S`, and the cone `g0` (see [`mod@super::stencil::factoring`]) exact. What the functional says more than
-//! the value itself, `ρ = F − g`, travels with the front: the correction solves the linear equation
+//! the value itself, the defect `ρ = F − g`, travels with the front: the correction solves the linear equation
 //!
 //! ```text
 //!   e(x) = (1−θ) e(a) + θ e(b) + ρ(x).

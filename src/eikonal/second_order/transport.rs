@@ -25,18 +25,18 @@ const MOST_ACTIVATIONS: u32 = 40;
 /// What carrying the correction through a tile brought.
 #[derive(Clone, Copy)]
 struct Outcome {
-    settled: bool,
+    converged: bool,
     /// The neighbours beside which something changed, one bit each as in [`RING`](crate::eikonal::stencil::ring::RING).
     changed: u8,
 }
 
 impl Outcome {
     fn to_bits(self) -> [u32; 2] {
-        [self.settled.into(), self.changed.into()]
+        [self.converged.into(), self.changed.into()]
     }
 
-    fn from_bits([settled, changed]: [u32; 2]) -> Self {
-        Self { settled: settled != 0, changed: changed as u8 }
+    fn from_bits([converged, changed]: [u32; 2]) -> Self {
+        Self { converged: converged != 0, changed: changed as u8 }
     }
 }
 
@@ -63,7 +63,7 @@ pub(super) fn carry(
         let tile = Job::from_bits(job).tile as usize;
         let outcome = match domain.feet(tile) {
             Some((feet, _)) => carry_tile(&tiling, feet, &e, tile, tolerance),
-            None => Outcome { settled: true, changed: 0 },
+            None => Outcome { converged: true, changed: 0 },
         };
         outcome.to_bits()
     };
@@ -78,7 +78,7 @@ pub(super) fn carry(
                     queue.wake(tile, keys[tile], ITSELF);
                 }
             };
-            if !outcome.settled {
+            if !outcome.converged {
                 wake(tile);
             }
             for (side, n) in neighbours(&tiling, tile) {
@@ -111,10 +111,10 @@ pub(super) fn carry(
 fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
     let mut block = [[0.0; SIDE + 2]; SIDE + 2];
     e.load(tile, &mut block);
-    let settled = simd::dispatch(Carry { block: &mut block, feet, tolerance });
+    let converged = simd::dispatch(Carry { block: &mut block, feet, tolerance });
     let changed = changed_sides(tiling, e, tile, &block, tolerance);
     e.store(tile, &block);
-    Outcome { settled, changed }
+    Outcome { converged, changed }
 }
 
 /// Sweeps the correction through a tile; comes to whether it converges.
@@ -211,7 +211,7 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance
     let (s, n) = (lanes(below, 1), lanes(above, 1));
     let (se, nw, ne, sw) = (lanes(below, 2), lanes(above, 0), lanes(above, 2), lanes(below, 0));
     let mut old = lanes(here, 1);
-    let Line { triangle: bits, theta, rho } = feet.line(row);
+    let Line { triangle: bits, theta, defect } = feet.line(row);
     // What comes from the lines beside, and the shares of the neighbours east and west in the line itself.
     let (mut beside, mut from_east, mut from_west) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {
@@ -221,7 +221,7 @@ fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance
         let across = triangle.negative.choose(n[i], s[i]);
         let own = 1.0 - theta[i];
         let a = triangle.along_y.choose(own * across, 0.0);
-        beside[i] = choose(moves, a + theta[i] * b + rho[i], old[i]);
+        beside[i] = choose(moves, a + theta[i] * b + defect[i], old[i]);
         let along = triangle.along_y.choose(0.0, choose(moves, own, 0.0));
         from_west[i] = triangle.negative.choose(along, 0.0);
         from_east[i] = along - from_west[i];
