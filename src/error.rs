@@ -217,6 +217,20 @@ impl Error {
         }
     }
 
+    /// The same for what the file may well say, but this crate does not read: an [`Error::Argument`] becomes an
+    /// [`Error::Unsupported`]; the others stay as they are.
+    #[must_use]
+    pub fn unsupported_in(self, path: impl AsRef<Path>) -> Self {
+        match self {
+            Self::Argument(mismatch) => {
+                let (found, advice) = mismatch.clauses();
+                Self::unsupported_file(path, found, advice)
+            }
+            Self::Usage(message) => Self::unsupported(path, message),
+            other => other,
+        }
+    }
+
     #[doc(hidden)]
     pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
         Mismatch {
@@ -279,6 +293,17 @@ impl Mismatch {
         Self { advice: Some(advice.into()), ..self }
     }
 
+    /// What is found, and what it must be and what to do.
+    fn clauses(&self) -> (String, String) {
+        let mut found = format!("{}{}", self.what, at_clause(&self.at));
+        if !self.found.is_empty() {
+            found += &format!(" is {}", self.found);
+        }
+        let expected = self.expected.iter().map(|expected| format!("it must be {expected}"));
+        let advice: Vec<_> = expected.chain(self.advice.clone()).collect();
+        (found, advice.join("; "))
+    }
+
     /// The [`Error::Format`] of a file in which this was found.
     #[must_use]
     pub fn in_file(self, path: impl AsRef<Path>) -> Error {
@@ -288,18 +313,8 @@ impl Mismatch {
 
 impl fmt::Display for Mismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { what, at, found, expected, advice } = self;
-        write!(f, "{what}{}", at_clause(at))?;
-        if !found.is_empty() {
-            write!(f, " is {found}")?;
-        }
-        if let Some(expected) = expected {
-            write!(f, "; it must be {expected}")?;
-        }
-        match advice {
-            Some(advice) => write!(f, "; {advice}"),
-            None => Ok(()),
-        }
+        let (found, advice) = self.clauses();
+        write!(f, "{found}{}", clause(&advice))
     }
 }
 

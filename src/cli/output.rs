@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use ridgeway::export::{
     Band, Samples, check_folder_free, check_free, write_file, write_folder, write_geotiff,
 };
-use ridgeway::{Error, Result, Terrain};
+use ridgeway::terrain::Georeference;
+use ridgeway::{Error, Result};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can
 /// be written once the work is done.
@@ -69,21 +70,22 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }
 
-/// Writes bands, each with what it holds and its unit, on the grid of the terrain.
+/// Writes bands, each with what it holds and its unit, on the grid of the DEM.
 ///
 /// # Errors
 /// The disk's.
 pub(crate) fn write_raster(
     path: &Path,
     overwrite: bool,
-    terrain: &Terrain,
+    georeference: &Georeference,
     bands: &[(String, Samples<'_>)],
 ) -> Result<()> {
     let bands: Vec<_> = bands
         .iter()
         .map(|(description, samples)| Band { description, samples: *samples })
         .collect();
-    write_file(path, overwrite, |out| write_geotiff(out, terrain.frame(), terrain.crs(), &bands))
+    let (frame, crs) = (georeference.frame(), georeference.crs());
+    write_file(path, overwrite, |out| write_geotiff(out, frame, crs, &bands))
 }
 
 /// Writes a file whose content is ready.

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use geojson::{GeoJson, Geometry, GeometryValue, Position};
 use glam::DVec2;
+use ridgeway::terrain::Georeference;
 use ridgeway::{Error, GridFrame, Result, StartRegion, Terrain};
 
 use crate::args::pair;
@@ -74,22 +75,22 @@ impl Notation {
     }
 
     /// Grid coordinates of two numbers.
-    fn to_grid(self, at: DVec2, terrain: &Terrain) -> Result<DVec2> {
+    fn to_grid(self, at: DVec2, georeference: &Georeference) -> Result<DVec2> {
         match self {
-            Self::Map => Ok(terrain.frame().to_grid(at)),
-            Self::LonLat => terrain.from_lonlat(at),
+            Self::Map => Ok(georeference.frame().to_grid(at)),
+            Self::LonLat => georeference.from_lonlat(at),
             Self::Pixel => Ok(at),
         }
     }
 
     /// Grid coordinates as the user would write them, to about a hundredth of a cell.
-    fn write(self, grid: DVec2, terrain: &Terrain) -> Result<String> {
-        let frame = terrain.frame();
+    fn write(self, grid: DVec2, georeference: &Georeference) -> Result<String> {
+        let frame = georeference.frame();
         let map = frame.to_map(grid);
         let (at, cell) = match self {
             Self::Map => (map, frame.step().min_element()),
             Self::LonLat => {
-                (terrain.to_lonlat(grid)?, frame.mid_spacing().min_element() / 111_000.0)
+                (georeference.to_lonlat(grid)?, frame.mid_spacing().min_element() / 111_000.0)
             }
             Self::Pixel => (grid, 1.0),
         };
@@ -123,7 +124,7 @@ impl Spot {
         terrain: &Terrain,
     ) -> Result<Self> {
         let frame = terrain.frame();
-        let grid = notation.to_grid(at, terrain)?;
+        let grid = notation.to_grid(at, terrain.georeference())?;
         if frame.covers(grid) {
             // The surface ends at the outermost nodes, half a cell before the raster does.
             return Ok(Self { option, name, at: frame.clamp(grid), notation });
@@ -135,11 +136,11 @@ impl Spot {
         };
         let mut message = format!(
             "{option} {name} lies outside the DEM, which reaches from {} to {}",
-            notation.write(low, terrain)?,
-            notation.write(high, terrain)?,
+            notation.write(low, terrain.georeference())?,
+            notation.write(high, terrain.georeference())?,
         );
         let swapped = DVec2::new(at.y, at.x);
-        if notation.to_grid(swapped, terrain).is_ok_and(|grid| frame.covers(grid)) {
+        if notation.to_grid(swapped, terrain.georeference()).is_ok_and(|grid| frame.covers(grid)) {
             let names = match notation {
                 Notation::Map => "x and y",
                 Notation::LonLat => "longitude and latitude",
@@ -148,7 +149,10 @@ impl Spot {
             message += &format!("; {names} look swapped: try {}", Place::At(notation, swapped));
         } else if let Some(near) = nearest(frame, frame.clamp(grid), |c, r| !terrain.is_void(c, r))
         {
-            message += &format!("; the nearest place on it is {}", notation.write(near, terrain)?);
+            message += &format!(
+                "; the nearest place on it is {}",
+                notation.write(near, terrain.georeference())?
+            );
         }
         Err(Error::usage(message))
     }
@@ -157,7 +161,7 @@ impl Spot {
     /// Its cell is not good: the message says `why` and names the nearest good place.
     pub(crate) fn check(
         &self,
-        terrain: &Terrain,
+        georeference: &Georeference,
         good: impl Fn(usize, usize) -> bool,
         why: &str,
     ) -> Result<()> {
@@ -165,20 +169,20 @@ impl Spot {
         if good(col, row) {
             return Ok(());
         }
-        Err(Error::usage(self.refusal(terrain, good, why)?))
+        Err(Error::usage(self.refusal(georeference, good, why)?))
     }
 
     /// The sentence that refuses this place and names the nearest good one.
     pub(crate) fn refusal(
         &self,
-        terrain: &Terrain,
+        georeference: &Georeference,
         good: impl Fn(usize, usize) -> bool,
         why: &str,
     ) -> Result<String> {
         let Self { option, name, .. } = self;
-        Ok(match nearest(terrain.frame(), self.at, good) {
+        Ok(match nearest(georeference.frame(), self.at, good) {
             Some(near) => {
-                let near = self.notation.write(near, terrain)?;
+                let near = self.notation.write(near, georeference)?;
                 format!("{option} {name} {why}; the nearest good place is {near}")
             }
             None => format!("{option} {name} {why}, and so does every other cell"),
@@ -204,7 +208,7 @@ pub(crate) fn regions(
                 spots.push(Spot::new(option, place.to_string(), *notation, *at, terrain)?);
             }
             Place::File(path) => {
-                region = read_shapes(path, terrain)?;
+                region = read_shapes(path, terrain.georeference())?;
                 for &grid in &region.points {
                     spots.push(file_spot(option, path, grid, terrain)?);
                 }
@@ -242,7 +246,7 @@ fn file_spot(option: &'static str, path: &Path, grid: DVec2, terrain: &Terrain) 
 ///
 /// # Errors
 /// The file cannot be read, is not GeoJSON, holds no geometry; the DEM has no CRS.
-pub(crate) fn read_shapes(path: &Path, terrain: &Terrain) -> Result<StartRegion> {
+pub(crate) fn read_shapes(path: &Path, georeference: &Georeference) -> Result<StartRegion> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
     if text.is_empty() {
         return Err(Error::format(path, "the file is empty"));
@@ -258,7 +262,7 @@ pub(crate) fn read_shapes(path: &Path, terrain: &Terrain) -> Result<StartRegion>
     };
     let mut shapes = StartRegion::default();
     for geometry in &geometries {
-        gather(&geometry.value, terrain, &mut shapes)
+        gather(&geometry.value, georeference, &mut shapes)
             .map_err(|error| Error::format(path, error.to_string()))?;
     }
     if shapes == StartRegion::default() {
@@ -267,9 +271,13 @@ pub(crate) fn read_shapes(path: &Path, terrain: &Terrain) -> Result<StartRegion>
     Ok(shapes)
 }
 
-fn gather(geometry: &GeometryValue, terrain: &Terrain, shapes: &mut StartRegion) -> Result<()> {
+fn gather(
+    geometry: &GeometryValue,
+    georeference: &Georeference,
+    shapes: &mut StartRegion,
+) -> Result<()> {
     let point = |at: &Position| match *at.as_slice() {
-        [lon, lat, ..] => terrain.from_lonlat(DVec2::new(lon, lat)),
+        [lon, lat, ..] => georeference.from_lonlat(DVec2::new(lon, lat)),
         _ => Err(Error::usage("a position needs two numbers")),
     };
     let line = |points: &Vec<Position>| points.iter().map(point).collect::<Result<Vec<_>>>();
@@ -287,7 +295,7 @@ fn gather(geometry: &GeometryValue, terrain: &Terrain, shapes: &mut StartRegion)
         }
         GeometryValue::GeometryCollection { geometries } => {
             for geometry in geometries {
-                gather(&geometry.value, terrain, shapes)?;
+                gather(&geometry.value, georeference, shapes)?;
             }
         }
     }

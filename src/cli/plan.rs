@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use ridgeway::terrain::read_bands;
+use ridgeway::terrain::{Georeference, read_bands};
 use ridgeway::{
     Control, DistanceMap, Error, GridFrame, HeightSurface, Metric, MetricField, Modifiers, Result,
     Smoothing, StartRegion, Stop, Sym2, Terrain,
@@ -20,7 +20,7 @@ pub(crate) struct Journey<'a> {
     args: &'a GroundArgs,
     pub(crate) control: &'a Control,
     dem: &'a Path,
-    pub(crate) terrain: Terrain,
+    pub(crate) georeference: Georeference,
     pub(crate) surface: HeightSurface,
     /// One for each `--start`.
     pub(crate) regions: Vec<StartRegion>,
@@ -34,7 +34,8 @@ pub(crate) struct Journey<'a> {
 }
 
 impl<'a> Journey<'a> {
-    /// Reads the DEM and the files named by flags, puts the places on the grid, and fits the surface.
+    /// Reads the DEM and the files named by flags, puts the places on the grid, and fits the surface. The terrain is for
+    /// those who draw its relief; others drop it, and its memory.
     ///
     /// # Errors
     /// Any input that cannot be read or used; a place outside the DEM, on a void or on a barrier.
@@ -44,7 +45,7 @@ impl<'a> Journey<'a> {
         args: &'a GroundArgs,
         run: &RunArgs,
         control: &'a Control,
-    ) -> Result<Self> {
+    ) -> Result<(Self, Terrain)> {
         let terrain = open(dem, run)?;
         let barrier = barrier(args, &terrain)?;
         let (regions, starts) = places::regions("--start", start, &terrain)?;
@@ -60,11 +61,11 @@ impl<'a> Journey<'a> {
         };
         let surface = fit(dem, &terrain, &args.fit, control)?;
         let start_names = start.iter().map(Place::to_string).collect();
-        Ok(Self {
+        let journey = Self {
             args,
             control,
             dem,
-            terrain,
+            georeference: terrain.georeference().clone(),
             surface,
             regions,
             starts,
@@ -74,13 +75,8 @@ impl<'a> Journey<'a> {
             tensors,
             cost,
             quiet: run.quiet,
-        })
-    }
-
-    /// Gives the memory of the heights back, for commands that draw no relief.
-    pub(crate) fn without_heights(mut self) -> Self {
-        self.terrain.free_heights();
-        self
+        };
+        Ok((journey, terrain))
     }
 
     /// The metric of this name.
@@ -116,7 +112,7 @@ impl<'a> Journey<'a> {
                 (MetricName::Tensor, None) => "lies where --tensor has no value",
                 (_, None) => "lies where the metric is too extreme to compute with",
             };
-            spot.check(&self.terrain, |col, row| field.is_open(col, row), why)?;
+            spot.check(&self.georeference, |col, row| field.is_open(col, row), why)?;
         }
         self.note_climb_weight(name, &field);
         Ok(field)
@@ -161,7 +157,7 @@ impl<'a> Journey<'a> {
             if distance.at(goal.at).is_none() {
                 let reached = |col, row| distance.at_node(col, row).is_finite();
                 let why = "cannot be reached from the start: voids, barriers or too steep ground lie between";
-                return Err(Error::NoWay(goal.refusal(&self.terrain, reached, why)?));
+                return Err(Error::NoWay(goal.refusal(&self.georeference, reached, why)?));
             }
         }
         Ok(distance)
@@ -169,7 +165,7 @@ impl<'a> Journey<'a> {
 
     /// Cells with a height that `field` lets nobody enter, row-major.
     pub(crate) fn barriers(&self, field: &MetricField<'_>) -> Vec<bool> {
-        let frame = self.terrain.frame();
+        let frame = self.georeference.frame();
         let nodes = (0..frame.rows()).flat_map(|row| (0..frame.cols()).map(move |col| (col, row)));
         nodes.map(|(c, r)| !field.is_open(c, r) && !self.surface.is_void(c, r)).collect()
     }
@@ -260,7 +256,7 @@ pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
 fn barrier(args: &GroundArgs, terrain: &Terrain) -> Result<Option<Arc<[bool]>>> {
     let mut shapes = StartRegion::default();
     for path in &args.metric.barrier {
-        let more = places::read_shapes(path, terrain)?;
+        let more = places::read_shapes(path, terrain.georeference())?;
         shapes.points.extend(more.points);
         shapes.lines.extend(more.lines);
         shapes.areas.extend(more.areas);
@@ -284,7 +280,7 @@ fn check_open<'s>(
             true => "lies on a void of the DEM",
             false => "lies on a barrier",
         };
-        spot.check(terrain, open, why)?;
+        spot.check(terrain.georeference(), open, why)?;
     }
     for region in regions.iter().filter(|region| region.points.is_empty()) {
         let touched = cover(terrain.frame(), region);

@@ -1,7 +1,7 @@
 //! `ridgeway compare`: one pair of places under several metrics.
 
 use ridgeway::export::routes_geojson;
-use ridgeway::{Comparison, Control, Error, MetricField, Result, Route};
+use ridgeway::{Comparison, Control, Error, MetricField, Result, Route, Terrain};
 use serde_json::{Value, json};
 
 use super::render;
@@ -22,7 +22,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     }
     let names = metrics(args)?;
     let places = (&args.start.start[..], std::slice::from_ref(&args.goal));
-    let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    let (journey, terrain) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let [goal] = &journey.goals[..] else {
         return Err(Error::usage(format!(
             "--goal {} holds {} points; compare takes one goal",
@@ -43,7 +43,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     let table = table(&fields, &comparison).to_string();
     let summary = summary(&fields, &comparison, &journey);
     if let Some(folder) = &args.output {
-        let contents = contents(args, &fields, &comparison, &summary, &journey)?;
+        let contents = contents(args, &fields, &comparison, &summary, (&journey, &terrain))?;
         control.check()?;
         write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
@@ -116,16 +116,16 @@ fn contents(
     fields: &[MetricField<'_>],
     comparison: &Comparison,
     summary: &Value,
-    journey: &Journey<'_>,
+    (journey, terrain): (&Journey<'_>, &Terrain),
 ) -> Result<[Vec<u8>; FILES.len()]> {
     let named: Vec<(&str, &Route)> =
         fields.iter().map(MetricField::name).zip(&comparison.routes).collect();
     let Comparison { routes, distances, .. } = comparison;
-    let geojson = routes_geojson(&named, journey.terrain.crs(), &journey.provenance(fields))?;
+    let geojson = routes_geojson(&named, journey.georeference.crs(), &journey.provenance(fields))?;
     Ok([
         geojson.into_bytes(),
         profiles(&named, journey)?,
         format!("{summary:#}\n").into_bytes(),
-        render::map(journey, &args.dem, fields, routes, distances, PIXELS)?,
+        render::map((journey, terrain), &args.dem, fields, routes, distances, PIXELS)?,
     ])
 }

@@ -32,8 +32,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     }
     let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
-    let journey =
-        Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
+    let (journey, _) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = journey.field(name, control)?;
     let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
     let map = journey.solve(&field, &stop)?;
@@ -53,7 +52,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
         let labels: Vec<u32> =
             map.labels().into_iter().map(|label| label.map_or(0, |label| label + 1)).collect();
         let bands = [("nearest start".into(), Samples::U32(&labels))];
-        write_raster(path, args.overwrite, &journey.terrain, &bands)?;
+        write_raster(path, args.overwrite, &journey.georeference, &bands)?;
     }
     let report = report(args, &journey, &field, &map, &provenance);
     let written: String = outputs.iter().map(|path| wrote(path)).collect();
@@ -92,7 +91,7 @@ fn write_map(
     if args.error {
         bands.push((format!("estimated error ({})", map.unit()), Samples::F32Rows(&errors)));
     }
-    write_raster(path, args.overwrite, &journey.terrain, &bands)
+    write_raster(path, args.overwrite, &journey.georeference, &bands)
 }
 
 fn isolines_file(
@@ -104,9 +103,9 @@ fn isolines_file(
     let values = &map.to_row_major()[..];
     let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let step = args.step.unwrap_or_else(|| round_step(largest.into(), ISOLINES));
-    let frame = journey.terrain.frame();
+    let frame = journey.georeference.frame();
     let lines = isolines(frame, values, &levels_by_step(values, step)?)?;
-    let crs = journey.terrain.crs();
+    let crs = journey.georeference.crs();
     Ok(isolines_geojson(&lines, frame, map.unit(), crs, provenance)?.into_bytes())
 }
 

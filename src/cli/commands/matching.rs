@@ -11,7 +11,7 @@ use ridgeway::render::{
     LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, pair_colour, png,
 };
 use ridgeway::surface::{NurbsGrid, NurbsSurface};
-use ridgeway::{Control, Error, ParametricSurface, Result};
+use ridgeway::{Control, Error, ParametricSurface, Result, Terrain};
 use serde_json::{Value, json};
 
 use super::render::title;
@@ -69,7 +69,7 @@ struct Subject<'a> {
 }
 
 enum Ground<'a> {
-    Heights(Box<Journey<'a>>),
+    Heights(Box<Journey<'a>>, Terrain),
     Nurbs(Box<NurbsGrid>),
 }
 
@@ -99,11 +99,12 @@ impl<'a> Subject<'a> {
             (Ground::Nurbs(Box::new(surface)), ranks, field)
         } else {
             let name = args.ground.metric.chosen(args.metric)?;
-            let journey = Journey::prepare(path, (&[], &[]), &args.ground, run, control)?;
+            let (journey, terrain) =
+                Journey::prepare(path, (&[], &[]), &args.ground, run, control)?;
             let metric = journey.field(name, control)?;
             let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
             drop(metric);
-            (Ground::Heights(Box::new(journey)), ranks, field)
+            (Ground::Heights(Box::new(journey), terrain), ranks, field)
         };
         let surface = ground.surface();
         let (regions, solver) = (&args.regions, args.ground.metric.solver());
@@ -118,7 +119,7 @@ impl<'a> Subject<'a> {
         let [col, row] = self.level.regions[region].seed;
         let node = DVec2::new(col as f64, row as f64);
         match &self.ground {
-            Ground::Heights(journey) => journey.terrain.frame().to_map(node).to_array().into(),
+            Ground::Heights(_, terrain) => terrain.frame().to_map(node).to_array().into(),
             Ground::Nurbs(surface) => surface.space_jet(node).point.to_array().into(),
         }
     }
@@ -127,7 +128,7 @@ impl<'a> Subject<'a> {
 impl Ground<'_> {
     fn surface(&self) -> &dyn ParametricSurface {
         match self {
-            Self::Heights(journey) => &journey.surface,
+            Self::Heights(journey, _) => &journey.surface,
             Self::Nurbs(surface) => &**surface,
         }
     }
@@ -152,8 +153,7 @@ fn colours(subjects: &[Subject<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
 /// The surfaces side by side.
 fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
     let picture = |(subject, colours): (&Subject<'_>, &Vec<Rgb>)| match &subject.ground {
-        Ground::Heights(journey) => {
-            let terrain = &journey.terrain;
+        Ground::Heights(_, terrain) => {
             let outlines = outlines(&subject.level, terrain.frame().cols());
             let mut map = MapPicture::new(terrain.frame(), terrain.heights());
             (map.title, map.max_side_px) = (title(subject.path), PIXELS);

@@ -5,7 +5,7 @@ use std::path::Path;
 use ridgeway::grid::{Isoline, isolines, levels_by_step, round_step};
 use ridgeway::render::{FieldPicture, Gradient, IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::route::trace;
-use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Route, Stop};
+use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Route, Stop, Terrain};
 use serde_json::json;
 
 use crate::args::{Layer, Picture, RenderArgs, RunArgs};
@@ -62,7 +62,7 @@ fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> R
 fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
     let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start[..], &args.goal[..]);
-    let journey = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
+    let (journey, terrain) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let fields = [journey.field(name, control)?];
     let distances = [journey.solve(&fields[0], &Stop::Never)?];
     let routes = journey
@@ -70,19 +70,18 @@ fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>
         .iter()
         .map(|goal| trace(&distances[0], &fields[0], goal.at))
         .collect::<Result<Vec<_>>>()?;
-    map(&journey, &args.dem, &fields, &routes, &distances, args.width)
+    map((&journey, &terrain), &args.dem, &fields, &routes, &distances, args.width)
 }
 
 /// A map of the terrain, the distances under `fields`, and routes of any of these metrics, to one goal or one to each.
 pub(super) fn map(
-    journey: &Journey<'_>,
+    (journey, terrain): (&Journey<'_>, &Terrain),
     dem: &Path,
     fields: &[MetricField<'_>],
     routes: &[Route],
     distances: &[DistanceMap],
     width: u32,
 ) -> Result<Vec<u8>> {
-    let terrain = &journey.terrain;
     let frame = terrain.frame();
     let barriers = journey.barriers(&fields[0]);
     let lines = distances
@@ -122,7 +121,7 @@ fn equidistant(journey: &Journey<'_>, distance: &DistanceMap) -> Result<(f64, Ve
     let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let step = round_step(largest.into(), ISOLINES);
     let levels = levels_by_step(&values, step)?;
-    Ok((step, isolines(journey.terrain.frame(), &values, &levels)?))
+    Ok((step, isolines(journey.georeference.frame(), &values, &levels)?))
 }
 
 fn colour(metric: &str) -> Rgb {

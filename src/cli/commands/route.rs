@@ -23,8 +23,7 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
         .collect::<Result<Vec<_>>>()?;
     let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
-    let journey =
-        Journey::prepare(&args.dem, places, &args.ground, run, control)?.without_heights();
+    let (journey, _) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = journey.field(name, control)?;
     let map = journey.solve(&field, &journey.all_goals())?;
     let to_goal = |goal: &Spot| {
@@ -62,7 +61,7 @@ fn content(
     routes: &[(&str, &Route)],
     provenance: &Value,
 ) -> Result<Vec<u8>> {
-    let crs = journey.terrain.crs();
+    let crs = journey.georeference.crs();
     Ok(match format {
         "gpx" => routes_gpx(routes, crs)?.into_bytes(),
         "csv" => profiles(routes, journey)?,
@@ -72,7 +71,7 @@ fn content(
 
 /// The profiles of routes at a step of one cell, as CSV.
 pub(super) fn profiles(routes: &[(&str, &Route)], journey: &Journey<'_>) -> Result<Vec<u8>> {
-    let step = journey.terrain.frame().mid_spacing().min_element();
+    let step = journey.georeference.frame().mid_spacing().min_element();
     let profiles: Vec<_> =
         routes.iter().map(|(name, route)| (*name, route.profile(&journey.surface, step))).collect();
     let mut csv = Vec::new();

@@ -7,7 +7,7 @@ use ridgeway::region::{
     statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
-use ridgeway::{Control, HeightSurface, MetricField, ParametricSurface, Result, Solver};
+use ridgeway::{Control, HeightSurface, MetricField, ParametricSurface, Result, Solver, Terrain};
 use serde_json::{Map, Value, json};
 
 use super::render::title;
@@ -29,10 +29,8 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
         .collect::<Result<Vec<_>>>()?;
     let name = args.ground.metric.chosen(args.metric)?;
-    let mut journey = Journey::prepare(&args.dem, (&[], &[]), &args.ground, run, control)?;
-    if !formats.iter().any(|format| format == "png") {
-        journey = journey.without_heights();
-    }
+    let (journey, terrain) = Journey::prepare(&args.dem, (&[], &[]), &args.ground, run, control)?;
+    let relief = formats.iter().any(|format| format == "png").then_some(terrain);
     let metric = journey.field(name, control)?;
     let field = TensorField::sample(&metric, control)?;
     let ranks = metric.seed_ranks();
@@ -43,9 +41,12 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     control.check()?;
     let provenance = journey.provenance(std::slice::from_ref(&metric));
     for (path, format) in args.output.iter().zip(&formats) {
-        match format.as_str() {
-            "png" => write_content(path, args.overwrite, &outcome.picture(title(&args.dem))?)?,
-            "tif" | "tiff" => outcome.write_labels(path, args.overwrite)?,
+        match (format.as_str(), &relief) {
+            ("png", Some(terrain)) => {
+                let picture = outcome.picture(terrain, title(&args.dem))?;
+                write_content(path, args.overwrite, &picture)?;
+            }
+            ("tif" | "tiff", _) => outcome.write_labels(path, args.overwrite)?,
             _ => write_content(path, args.overwrite, &outcome.polygons(&provenance)?)?,
         }
     }
@@ -111,7 +112,7 @@ impl Outcome<'_> {
             move |(depth, (level, measures))| {
                 let named = level.regions.iter().zip(measures).enumerate();
                 named.map(move |(i, (region, (statistics, signature)))| {
-                    let seed = self.journey.terrain.frame().to_map(node(region.seed));
+                    let seed = self.journey.georeference.frame().to_map(node(region.seed));
                     let mut properties = Map::new();
                     let mut add = |name: &str, value: Value| properties.insert(name.into(), value);
                     add("level", (depth + 1).into());
@@ -139,8 +140,8 @@ impl Outcome<'_> {
         let polygons = self.outlines().into_iter().flatten();
         let regions: Vec<_> =
             self.named().zip(polygons).map(|((_, named), polygons)| (named, polygons)).collect();
-        let terrain = &self.journey.terrain;
-        Ok(regions_geojson(&regions, terrain.frame(), terrain.crs(), provenance)?.into_bytes())
+        let on = &self.journey.georeference;
+        Ok(regions_geojson(&regions, on.frame(), on.crs(), provenance)?.into_bytes())
     }
 
     fn write_labels(&self, path: &std::path::Path, overwrite: bool) -> Result<()> {
@@ -150,11 +151,10 @@ impl Outcome<'_> {
         let name = |depth: usize| format!("region of level {}", depth + 1);
         let bands: Vec<_> =
             numbers.iter().enumerate().map(|(i, n)| (name(i), Samples::U32(n))).collect();
-        write_raster(path, overwrite, &self.journey.terrain, &bands)
+        write_raster(path, overwrite, &self.journey.georeference, &bands)
     }
 
-    fn picture(&self, title: String) -> Result<Vec<u8>> {
-        let terrain = &self.journey.terrain;
+    fn picture(&self, terrain: &Terrain, title: String) -> Result<Vec<u8>> {
         let outlines = self.outlines();
         let mut map = MapPicture::new(terrain.frame(), terrain.heights());
         map.title = title;
@@ -208,11 +208,11 @@ impl Outcome<'_> {
         order.sort_by(|&a, &b| measures[b].0.area_m2.total_cmp(&measures[a].0.area_m2));
         let mut table = Table::default();
         table.row(["region", "of", "cells", "area", "slope", "|κ1|, 1/m", "|κ2|, 1/m", "seed"]);
-        let cell = self.journey.terrain.frame().step().min_element();
+        let cell = self.journey.georeference.frame().step().min_element();
         for &i in order.iter().take(NAMED) {
             let (region, m) = (&level.regions[i], &measures[i].0);
             let [larger, smaller] = m.mean_abs_curvature_per_m.map(digits);
-            let seed = self.journey.terrain.frame().to_map(node(region.seed));
+            let seed = self.journey.georeference.frame().to_map(node(region.seed));
             let [x, y] = seed.to_array().map(|value| coordinate(value, cell));
             table.row([
                 (i + 1).to_string(),

@@ -27,7 +27,7 @@ pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Resul
             .map(|(layer, make)| (layer.description().to_owned(), Samples::F32Rows(make)))
             .collect();
         control.check()?;
-        write_raster(output, args.overwrite, &terrain, &bands)?;
+        write_raster(output, args.overwrite, terrain.georeference(), &bands)?;
     }
     report(args, &surface).print(run)
 }

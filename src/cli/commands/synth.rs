@@ -24,7 +24,7 @@ pub(super) fn run(args: &SynthArgs, run: &RunArgs, control: &Control) -> Result<
         line.iter_mut().zip(heights).for_each(|(value, &z)| *value = z as f32);
     };
     let bands = [("height (m)".into(), Samples::F32Rows(&heights))];
-    write_raster(output, args.overwrite, &terrain, &bands)?;
+    write_raster(output, args.overwrite, terrain.georeference(), &bands)?;
     Report {
         text: wrote(output),
         json: json!({

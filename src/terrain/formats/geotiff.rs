@@ -9,69 +9,43 @@ use std::path::Path;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::tiff::{Directory, Fault, Layout, Outcome, Sample, Tiff, damaged, tag, unsupported};
-use crate::error::{Error, Result};
+use super::tiff::{
+    Directory, Layout, Sample, Tiff, TiffError, TiffResult, damaged, is_tiff, tag, unsupported,
+};
+use super::{Format, ReadMode};
+use crate::terrain::Source;
 use crate::terrain::crs::{Crs, GeoKeys, key, length_unit};
-use crate::terrain::{Raster, Source, Want};
+use crate::terrain::raster::Raster;
 
-/// Whether a file that begins so is a TIFF.
-pub(in crate::terrain) fn is_tiff(head: &[u8]) -> bool {
-    Tiff::is_tiff(head)
-}
+pub(super) const FORMAT: Format = Format {
+    name: "GeoTIFF",
+    is_own: |head| is_tiff(head.bytes),
+    extensions: &[],
+    read: |path, bytes, mode| read_image(path, bytes, mode).map_err(|error| error.in_file(path)),
+};
 
-/// Reads a GeoTIFF that lies in memory.
-pub(in crate::terrain) fn read(path: &Path, bytes: &[u8], want: Want) -> Result<Raster> {
-    read_image(path, bytes, want).map_err(|fault| match fault {
-        Fault::Damaged(message) => Error::format(path, message),
-        Fault::Unsupported(message) => Error::unsupported(path, message),
-    })
-}
-
-fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
+fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
     let images = Tiff::new(bytes)?.directories()?;
     let mut notes = Vec::new();
     let image = full_resolution(&images, &mut notes)?;
     let layout = Layout::new(image)?;
-    check_meaning(image, &layout)?;
+    refuse_pictures(image, &layout)?;
 
     let keys = geo_keys(image)?;
     let metadata = image.text(tag::GDAL_METADATA)?.unwrap_or_default();
-    let unit = match want {
-        Want::Heights => height_unit(&keys, &metadata)?,
-        Want::Bands => None,
+    let unit = match mode {
+        ReadMode::Heights => height_unit(&keys, &metadata)?,
+        ReadMode::Bands => None,
     };
-    // Tie points give the centre of a cell, not its corner.
-    let point = keys.short(key::RASTER_TYPE) == Some(2);
-    let place = match placement(image, point)? {
-        Some(place) => Some(place),
-        None => world_file(path)?,
-    };
-    let (origin, step) = place.unwrap_or_else(|| {
-        notes.push(
-            "the file has no place on a map: cells of 1 × 1 at the origin are assumed".to_owned(),
-        );
-        (DVec2::new(0.5, layout.rows as f64 - 0.5), DVec2::new(1.0, -1.0))
-    });
-    let crs = Crs::from_geo_keys(keys).map_err(|e| Fault::Unsupported(e.to_string()))?;
-    if want == Want::Heights {
-        if layout.bands > 1 {
-            notes.push(format!(
-                "the file has {} bands; the first is taken for the height",
-                layout.bands
-            ));
-        }
-        if unit.is_none() && crs.unit().contains("foot") {
-            notes.push(format!(
-                "the map unit is the {}, but the file does not say the unit of the heights; \
-                 they are taken as metres",
-                crs.unit()
-            ));
-        }
+    let Placement { origin, step } = place(path, image, &keys, layout.rows, &mut notes)?;
+    let crs = Crs::from_geo_keys(keys).map_err(TiffError::Crs)?;
+    if mode == ReadMode::Heights {
+        note_assumptions(&layout, unit.is_some(), &crs, &mut notes);
     }
     let nodata = image.text(tag::GDAL_NODATA)?.map(|t| t.trim().to_owned());
-    let bands = match want {
-        Want::Heights => 0..1,
-        Want::Bands => 0..layout.bands,
+    let bands = match mode {
+        ReadMode::Heights => 0..1,
+        ReadMode::Bands => 0..layout.bands,
     };
     let mask = internal_mask(&images, &layout)?;
     let bands = bands
@@ -81,7 +55,7 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
             scale(&mut values, &metadata, band)?;
             Ok(values)
         })
-        .collect::<Outcome<_>>()?;
+        .collect::<TiffResult<_>>()?;
     let (height_unit, metres_per_height_unit) = unit.unwrap_or(("metre", 1.0));
     Ok(Raster {
         cols: layout.cols,
@@ -91,7 +65,7 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
         crs,
         bands,
         source: Source {
-            format: "GeoTIFF".to_owned(),
+            format: FORMAT.name.to_owned(),
             sample: layout.sample.name(),
             height_unit: height_unit.to_owned(),
             metres_per_height_unit,
@@ -102,6 +76,21 @@ fn read_image(path: &Path, bytes: &[u8], want: Want) -> Outcome<Raster> {
     })
 }
 
+/// Says what is taken for granted of the heights.
+fn note_assumptions(layout: &Layout, has_unit: bool, crs: &Crs, notes: &mut Vec<String>) {
+    if layout.bands > 1 {
+        let bands = layout.bands;
+        notes.push(format!("the file has {bands} bands; the first is taken for the height"));
+    }
+    if !has_unit && crs.unit().contains("foot") {
+        notes.push(format!(
+            "the map unit is the {}, but the file does not say the unit of the heights; \
+             they are taken as metres",
+            crs.unit()
+        ));
+    }
+}
+
 /// Bits of `NewSubfileType`.
 const REDUCED: u64 = 1;
 const MASK: u64 = 4;
@@ -110,7 +99,7 @@ const MASK: u64 = 4;
 fn full_resolution<'a, 'b>(
     images: &'b [Directory<'a>],
     notes: &mut Vec<String>,
-) -> Outcome<&'b Directory<'a>> {
+) -> TiffResult<&'b Directory<'a>> {
     let mut whole = Vec::new();
     for image in images {
         if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == 0 {
@@ -123,27 +112,34 @@ fn full_resolution<'a, 'b>(
     Ok(whole.first().copied().unwrap_or(&images[0]))
 }
 
-/// Refuses pictures.
-fn check_meaning(image: &Directory, layout: &Layout) -> Outcome<()> {
+/// Refuses samples that are no heights.
+fn refuse_pictures(image: &Directory, layout: &Layout) -> TiffResult<()> {
     match (image.uint(tag::PHOTOMETRIC, 1)?, layout.sample) {
-        (_, Sample::Packed(1)) => unsupported("one bit per sample is a mask, not heights"),
+        (_, Sample::Packed(1)) => unsupported("one bit per sample: a mask, not heights", HEIGHTS),
         // Neither 0, white is lowest, nor 1, black is lowest, changes a height.
         (0 | 1, _) => Ok(()),
         // GDAL calls three floating-point bands RGB if told so, and they may well be a tensor.
         (2, sample) if sample.is_float() => Ok(()),
         (2, _) => unsupported(
-            "an RGB picture, not heights; if one band holds heights, take it with `gdal_translate -b`",
+            "an RGB picture, not heights",
+            "if one band holds heights, take it with `gdal_translate -b`",
         ),
-        (3, _) => unsupported("a palette picture: its numbers are indexes of colours, not heights"),
-        (4, _) => unsupported("a transparency mask, not heights"),
-        (other, _) => {
-            unsupported(format!("a picture (photometric interpretation {other}), not heights"))
-        }
+        (3, _) => unsupported(
+            "a palette picture, whose numbers are indexes of colours, not heights",
+            HEIGHTS,
+        ),
+        (4, _) => unsupported("a transparency mask, not heights", HEIGHTS),
+        (other, _) => unsupported(
+            format!("a picture (photometric interpretation {other}), not heights"),
+            HEIGHTS,
+        ),
     }
 }
 
+const HEIGHTS: &str = "a file of heights is needed";
+
 /// The GeoKeys; none at all if the image has no directory of them.
-fn geo_keys(image: &Directory) -> Outcome<GeoKeys> {
+fn geo_keys(image: &Directory) -> TiffResult<GeoKeys> {
     let directory = image.uints(tag::GEO_KEY_DIRECTORY)?.unwrap_or_default();
     Ok(GeoKeys {
         directory: directory.into_iter().map(|v| v as u16).collect(),
@@ -152,49 +148,87 @@ fn geo_keys(image: &Directory) -> Outcome<GeoKeys> {
     })
 }
 
-/// Map coordinates of the centre of the first cell, and the step per column and stored row.
-type Placement = (DVec2, DVec2);
+/// Where the cells lie on the map.
+struct Placement {
+    /// The centre of the first cell.
+    origin: DVec2,
+    /// Map units per column and per stored row.
+    step: DVec2,
+}
 
-const ROTATED: &str = "the grid is rotated or sheared against the map; make it north-up with \
-                       `gdalwarp -r bilinear IN OUT.tif`";
+impl Placement {
+    /// # Errors
+    /// A step that is not a finite number other than 0.
+    fn new(origin: DVec2, step: DVec2) -> TiffResult<Self> {
+        if step.is_finite() && step.abs().min_element() > 0.0 {
+            Ok(Self { origin, step })
+        } else {
+            let found = format!("{} × {}", step.x, step.y);
+            damaged("the cell size", found, "finite and not zero")
+        }
+    }
+}
+
+fn rotated<T>() -> TiffResult<T> {
+    unsupported(
+        "a grid that is rotated or sheared against the map",
+        "make it north-up with `gdalwarp -r bilinear IN OUT.tif`",
+    )
+}
+
+/// The place that the tags tell, else a world file, else none: cells of 1 × 1 at the origin.
+fn place(
+    path: &Path,
+    image: &Directory,
+    keys: &GeoKeys,
+    rows: usize,
+    notes: &mut Vec<String>,
+) -> TiffResult<Placement> {
+    // Tie points give the centre of a cell, not its corner.
+    let is_point = keys.short(key::RASTER_TYPE) == Some(2);
+    if let Some(placement) = placement(image, is_point)? {
+        return Ok(placement);
+    }
+    if let Some(placement) = world_file(path)? {
+        return Ok(placement);
+    }
+    notes.push(
+        "the file has no place on a map: cells of 1 × 1 at the origin are assumed".to_owned(),
+    );
+    Placement::new(DVec2::new(0.5, rows as f64 - 0.5), DVec2::new(1.0, -1.0))
+}
 
 /// What the tags of the image say of its place; `None` if nothing.
-fn placement(image: &Directory, point: bool) -> Outcome<Option<Placement>> {
-    let half = if point { 0.0 } else { 0.5 };
+fn placement(image: &Directory, is_point: bool) -> TiffResult<Option<Placement>> {
+    let half = if is_point { 0.0 } else { 0.5 };
     let matrix = image.doubles(tag::MODEL_TRANSFORMATION)?;
     if let [a, b, _, x, d, e, _, y, ..] = matrix[..] {
         // Rounding in the writer leaves dust; a real rotation moves the far corner by much more.
         if b.abs() > 1e-9 * e.abs() || d.abs() > 1e-9 * a.abs() {
-            return unsupported(ROTATED);
+            return rotated();
         }
         let step = DVec2::new(a, e);
-        return Ok(Some((DVec2::new(x, y) + half * step, check_step(step)?)));
+        return Placement::new(DVec2::new(x, y) + half * step, step).map(Some);
     }
     let scale = image.doubles(tag::MODEL_PIXEL_SCALE)?;
     let ties = image.doubles(tag::MODEL_TIE_POINT)?;
     match (&scale[..], &ties[..]) {
         ([sx, sy, ..], [i, j, _, x, y, ..]) => {
-            let step = check_step(DVec2::new(*sx, -sy))?;
-            Ok(Some((DVec2::new(*x, *y) + step * (DVec2::splat(half) - DVec2::new(*i, *j)), step)))
+            let step = DVec2::new(*sx, -sy);
+            let first = DVec2::splat(half) - DVec2::new(*i, *j);
+            Placement::new(DVec2::new(*x, *y) + step * first, step).map(Some)
         }
         ([], [_, _, _, _, _, _, _, ..]) => unsupported(
-            "the grid is placed by ground control points; make it north-up with `gdalwarp -tps IN OUT.tif`",
+            "a grid that is placed by ground control points",
+            "make it north-up with `gdalwarp -tps IN OUT.tif`",
         ),
         _ => Ok(None),
     }
 }
 
-fn check_step(step: DVec2) -> Outcome<DVec2> {
-    if step.is_finite() && step.abs().min_element() > 0.0 {
-        Ok(step)
-    } else {
-        damaged(format!("the cell size is {} × {}; it must be finite and not zero", step.x, step.y))
-    }
-}
-
 /// What a world file beside says, in six lines: x per column, y per column, x per row, y per row, and x and y
 /// of the centre of the first cell; `None` if there is no such file.
-fn world_file(path: &Path) -> Outcome<Option<Placement>> {
+fn world_file(path: &Path) -> TiffResult<Option<Placement>> {
     let beside = ["tfw", "TFW", "tifw", "wld"].map(|extension| path.with_extension(extension));
     let Some((file, text)) =
         beside.iter().find_map(|file| Some((file, fs::read_to_string(file).ok()?)))
@@ -203,9 +237,12 @@ fn world_file(path: &Path) -> Outcome<Option<Placement>> {
     };
     let numbers: Vec<f64> = text.split_whitespace().map_while(|t| t.parse().ok()).collect();
     match numbers[..] {
-        [a, 0.0, 0.0, e, x, y] => Ok(Some((DVec2::new(x, y), check_step(DVec2::new(a, e))?))),
-        [_, _, _, _, _, _] => unsupported(ROTATED),
-        _ => damaged(format!("the world file {} does not hold six numbers", file.display())),
+        [a, 0.0, 0.0, e, x, y] => Placement::new(DVec2::new(x, y), DVec2::new(a, e)).map(Some),
+        [_, _, _, _, _, _] => rotated(),
+        _ => {
+            let what = format!("the world file {}", file.display());
+            damaged(what, format!("a file of {} numbers", numbers.len()), "one of six")
+        }
     }
 }
 
@@ -250,7 +287,7 @@ fn void_nodata(
 }
 
 /// Validity of each cell from an internal mask of the same size: 1 where valid.
-fn internal_mask(images: &[Directory], layout: &Layout) -> Outcome<Option<Vec<f64>>> {
+fn internal_mask(images: &[Directory], layout: &Layout) -> TiffResult<Option<Vec<f64>>> {
     for image in images {
         if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == MASK {
             let mask = Layout::new(image)?;
@@ -274,12 +311,12 @@ fn metadata_item<'a>(metadata: &'a str, role: &str, band: usize) -> Option<&'a s
 }
 
 /// What the stored number `v` stands for: `scale · v + offset`.
-fn scale(values: &mut [f64], metadata: &str, band: usize) -> Outcome<()> {
+fn scale(values: &mut [f64], metadata: &str, band: usize) -> TiffResult<()> {
     let number = |role, default| match metadata_item(metadata, role, band) {
         None => Ok(default),
         Some(text) => match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => damaged(format!("the {role} `{text}` in GDAL_METADATA is not a number")),
+            _ => damaged(format!("the {role} in GDAL_METADATA"), format!("`{text}`"), "a number"),
         },
     };
     let (scale, offset) = (number("scale", 1.0)?, number("offset", 0.0)?);
@@ -290,22 +327,23 @@ fn scale(values: &mut [f64], metadata: &str, band: usize) -> Outcome<()> {
 }
 
 /// Name and metres of the unit of the heights: the band's own, else that of the vertical CRS.
-fn height_unit(keys: &GeoKeys, metadata: &str) -> Outcome<Option<(&'static str, f64)>> {
+fn height_unit(keys: &GeoKeys, metadata: &str) -> TiffResult<Option<(&'static str, f64)>> {
     if let Some(text) = metadata_item(metadata, "unittype", 0).filter(|t| !t.is_empty()) {
         return match named_unit(text) {
             Some(unit) => Ok(Some(unit)),
-            None => unsupported(format!(
-                "the unit of the heights is `{text}`, which is not known; scale them to metres, \
-                 for instance with `gdal_calc.py`"
-            )),
+            None => unsupported(
+                format!("heights in the unit `{text}`, which is not known"),
+                "scale them to metres, for instance with `gdal_calc.py`",
+            ),
         };
     }
     if let Some(code) = keys.short(key::VERTICAL_UNITS).filter(|c| *c != 32767) {
         return match length_unit(code) {
             Some(unit) => Ok(Some(unit)),
-            None => unsupported(format!(
-                "the unit of the heights is EPSG:{code}, which is not known; scale them to metres"
-            )),
+            None => unsupported(
+                format!("heights in the unit EPSG:{code}, which is not known"),
+                "scale them to metres, for instance with `gdal_calc.py`",
+            ),
         };
     }
     Ok(keys.short(key::VERTICAL_CRS).and_then(|code| match code {
@@ -335,6 +373,7 @@ fn named_unit(name: &str) -> Option<(&'static str, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Result;
 
     /// A little-endian TIFF of one uncompressed strip, with further tags of shorts, doubles or text.
     struct Writer {
@@ -402,7 +441,7 @@ mod tests {
         }
 
         fn read(&self) -> Result<Raster> {
-            read(Path::new("dem.tif"), &self.bytes(), Want::Heights)
+            (FORMAT.read)(Path::new("dem.tif"), &self.bytes(), ReadMode::Heights)
         }
 
         fn refusal(&self) -> String {

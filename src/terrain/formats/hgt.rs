@@ -8,8 +8,16 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use crate::error::{Error, Result};
-use crate::terrain::{Crs, Raster, Source};
+use super::{Format, Head, ReadMode};
+use crate::error::{Mismatch, Result};
+use crate::terrain::raster::Raster;
+use crate::terrain::{Crs, Source};
+
+pub(super) const FORMAT: Format =
+    Format { name: "SRTM HGT", is_own: is_named_so, extensions: &["hgt"], read };
+
+const GZIP: &[u8] = b"\x1f\x8b";
+const ZIP: &[u8] = b"PK\x03\x04";
 
 /// Nodes along a side: 3″ and 1″ tiles.
 const SIDES: [usize; 2] = [1201, 3601];
@@ -17,23 +25,36 @@ const SIDES: [usize; 2] = [1201, 3601];
 const LARGEST: u64 = 2 * 3601 * 3601;
 const VOID: i16 = i16::MIN;
 
+/// A tile has no magic number: `.hgt`, or an archive of such a file by its name.
+fn is_named_so(head: &Head) -> bool {
+    let packed = head.bytes.starts_with(GZIP) || head.bytes.starts_with(ZIP);
+    head.extension == "hgt" || (packed && head.inner_extension == "hgt")
+}
+
+fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
+    // The heights of a tile that is not packed may begin like an archive.
+    let packed = !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("hgt"));
+    if packed && bytes.starts_with(GZIP) {
+        read_tile(path, &gunzip(path, bytes)?)
+    } else if packed && bytes.starts_with(ZIP) {
+        read_tile(path, &unzip(path, bytes)?)
+    } else {
+        read_tile(path, bytes)
+    }
+}
+
 /// Reads a tile that has been unpacked; `path` gives the place.
-pub(in crate::terrain) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
+fn read_tile(path: &Path, bytes: &[u8]) -> Result<Raster> {
     let Some(side) = SIDES.into_iter().find(|side| 2 * side * side == bytes.len()) else {
-        return Err(Error::format(
-            path,
-            format!(
-                "a tile has 1201 × 1201 or 3601 × 3601 cells of two bytes, 2884802 or 25934402 bytes; \
-                 this one has {}",
-                bytes.len()
-            ),
-        ));
+        let expected =
+            "2884802 or 25934402 bytes, for 1201 × 1201 or 3601 × 3601 cells of two bytes";
+        let found = format!("{} bytes", bytes.len());
+        return Err(Mismatch::new("the size of the tile", found, expected).in_file(path));
     };
     let Some(corner) = south_west_corner(path) else {
-        return Err(Error::format(
-            path,
-            "the name of a tile tells its place, such as N42E001.hgt for 42° N 1° E; this name does not",
-        ));
+        let expected = "that of its place, such as N42E001.hgt for 42° N 1° E";
+        let found = format!("{}", path.file_name().unwrap_or_default().display());
+        return Err(Mismatch::new("the name of the tile", found, expected).in_file(path));
     };
     let (cells, _) = bytes.as_chunks::<2>();
     let height = |cell: &[u8; 2]| match i16::from_be_bytes(*cell) {
@@ -49,7 +70,7 @@ pub(in crate::terrain) fn read(path: &Path, bytes: &[u8]) -> Result<Raster> {
         crs: Crs::from_epsg(4326)?,
         bands: vec![cells.iter().map(height).collect()],
         source: Source {
-            format: "SRTM HGT".to_owned(),
+            format: FORMAT.name.to_owned(),
             sample: "int16".to_owned(),
             nodata: Some(VOID.to_string()),
             ..Source::default()
@@ -75,31 +96,32 @@ fn south_west_corner(path: &Path) -> Option<DVec2> {
     Some(DVec2::new(lon, lat))
 }
 
-/// Unpacks a gzip, to the size of the largest tile and no further.
-pub(in crate::terrain) fn gunzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
+/// Unpacks a gzip.
+fn gunzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
     at_most_a_tile(path, flate2::read::MultiGzDecoder::new(bytes))
 }
 
 /// Unpacks the one tile of a zip archive.
-pub(in crate::terrain) fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
-    let fault =
-        |e: zip::result::ZipError| Error::format(path, format!("the zip archive is damaged: {e}"));
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(fault)?;
+fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
+    let damaged = |e: zip::result::ZipError| Mismatch::damaged("the zip archive", e).in_file(path);
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
     for i in 0..archive.len() {
-        let file = archive.by_index(i).map_err(fault)?;
-        if file.name().map_err(fault)?.to_ascii_lowercase().ends_with(".hgt") {
+        let file = archive.by_index(i).map_err(damaged)?;
+        if file.name().map_err(damaged)?.to_ascii_lowercase().ends_with(".hgt") {
             return at_most_a_tile(path, file);
         }
     }
-    Err(Error::format(path, "there is no .hgt file in the zip archive"))
+    let expected = "1 or more";
+    Err(Mismatch::new("the number of .hgt files in the zip archive", 0, expected).in_file(path))
 }
 
+/// Unpacks to the size of the largest tile and a byte more, whatever the archive claims.
 fn at_most_a_tile(path: &Path, stream: impl Read) -> Result<Vec<u8>> {
     let mut tile = Vec::new();
     stream
         .take(LARGEST + 1)
         .read_to_end(&mut tile)
-        .map_err(|e| Error::format(path, format!("the compressed tile is damaged: {e}")))?;
+        .map_err(|e| Mismatch::damaged("the compressed tile", e).in_file(path))?;
     Ok(tile)
 }
 
@@ -121,11 +143,11 @@ mod tests {
     fn a_tile_is_big_endian_and_runs_from_the_north_west() {
         let mut bytes = vec![0; 2 * 1201 * 1201];
         bytes[..6].copy_from_slice(&[0x01, 0x02, 0xff, 0xff, 0x80, 0x00]);
-        let raster = read(Path::new("S01W002.hgt"), &bytes).unwrap();
+        let raster = read_tile(Path::new("S01W002.hgt"), &bytes).unwrap();
         assert_eq!(raster.bands[0][..2], [258.0, -1.0]);
         assert!(raster.bands[0][2].is_nan());
         assert_eq!(raster.origin, DVec2::new(-2.0, 0.0));
-        assert!(read(Path::new("S01W002.hgt"), &bytes[1..]).is_err());
-        assert!(read(Path::new("tile.hgt"), &bytes).unwrap_err().to_string().contains("name"));
+        assert!(read_tile(Path::new("S01W002.hgt"), &bytes[1..]).is_err());
+        assert!(read_tile(Path::new("tile.hgt"), &bytes).unwrap_err().to_string().contains("name"));
     }
 }

@@ -1,0 +1,53 @@
+//! Files that are no DEM, or one of a format that is not read: known well enough to say what to do with them.
+
+use std::path::Path;
+
+use super::Head;
+use crate::error::{Error, Mismatch, Result};
+
+const CONVERT: &str = "convert it with `gdal_translate IN OUT.tif`";
+
+/// Beginning of a file, what it is, and what to do with it.
+const MAGIC: [(&[u8], &str, &str); 11] = [
+    (b"\x1f\x8b", "a gzip file", "unpack it with `gunzip`"),
+    (b"PK\x03\x04", "a zip archive", "unpack it first"),
+    (b"\x89PNG", "a picture (PNG), not read yet", CONVERT),
+    (b"\xff\xd8\xff", "a picture (JPEG), not read yet", CONVERT),
+    (b"P5", "a picture (PGM), not read yet", CONVERT),
+    (b"DSAA", "a Surfer grid, not read yet", CONVERT),
+    (b"DSBB", "a Surfer grid, not read yet", CONVERT),
+    (b"DSRB", "a Surfer grid, not read yet", CONVERT),
+    (b"\x89HDF", "an HDF5 or netCDF file, which is not read", CONVERT),
+    (b"CDF", "a netCDF file, which is not read", CONVERT),
+    (b"\x93NUMPY", "a NumPy array, not read yet", "write it as a GeoTIFF"),
+];
+
+/// Extensions of DEMs that cannot be told by their content.
+const EXTENSIONS: [&str; 7] = ["flt", "bil", "bip", "bsq", "xyz", "csv", "dem"];
+
+/// Refuses what stands in the place of a file that was to be fetched.
+pub(super) fn refuse_stand_in(path: &Path, head: &Head) -> Result<()> {
+    let begins = |start: &str| head.text.starts_with(start);
+    if begins("<!doctype html") || begins("<html") {
+        let page = Mismatch::new("the file", "an HTML page", "a DEM");
+        return Err(page.advise("the download went wrong: fetch the file again").in_file(path));
+    }
+    if begins("version https://git-lfs") {
+        let pointer = Mismatch::new("the file", "a Git LFS pointer", "the DEM itself");
+        return Err(pointer.advise("fetch it with `git lfs pull`").in_file(path));
+    }
+    Ok(())
+}
+
+/// Refuses files of formats that are known but not read.
+pub(super) fn refuse_known(path: &Path, head: &Head) -> Result<()> {
+    if let Some((_, found, advice)) = MAGIC.iter().find(|(magic, ..)| head.bytes.starts_with(magic))
+    {
+        return Err(Error::unsupported_file(path, *found, *advice));
+    }
+    if EXTENSIONS.contains(&head.extension.as_str()) {
+        let found = format!("a .{} file, not read yet", head.extension);
+        return Err(Error::unsupported_file(path, found, CONVERT));
+    }
+    Ok(())
+}

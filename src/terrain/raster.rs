@@ -1,0 +1,137 @@
+//! What a reader hands over, and the bands of rasters that hold no heights.
+
+use std::path::Path;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::Crs;
+use super::formats::{self, ReadMode};
+use super::terrain::Source;
+use crate::error::{Error, Result};
+use crate::grid::GridFrame;
+
+/// The bands of a raster that does not hold heights.
+#[derive(Clone, Debug)]
+pub struct RasterBands {
+    /// The grid.
+    pub frame: GridFrame,
+    /// The coordinate reference system.
+    pub crs: Crs,
+    /// The values of each band, row-major from the north-west; `NaN` where there is no value.
+    pub bands: Vec<Vec<f64>>,
+}
+
+/// Reads all bands of a raster, such as a tensor field, in the formats that
+/// [`Terrain::open`](super::Terrain::open) reads.
+///
+/// # Errors
+/// As [`Terrain::open`](super::Terrain::open).
+pub fn read_bands(path: impl AsRef<Path>) -> Result<RasterBands> {
+    let path = path.as_ref();
+    let mut raster = formats::read(path, ReadMode::Bands)?;
+    let frame = raster.turn_north_up(path)?;
+    raster.bands.iter_mut().for_each(|band| void_infinite(band));
+    Ok(RasterBands { frame, crs: raster.crs, bands: raster.bands })
+}
+
+/// Infinite cells carry no value either.
+pub(super) fn void_infinite(values: &mut [f64]) {
+    values.par_iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
+}
+
+/// What a reader hands over: values as stored (scaled, not yet in metres), rows in the file's order.
+#[derive(Debug)]
+pub(super) struct Raster {
+    pub(super) cols: usize,
+    pub(super) rows: usize,
+    /// Map coordinates of the centre of the first stored cell.
+    pub(super) origin: DVec2,
+    /// Map units per column and per stored row; `y` is negative if the rows run southwards.
+    pub(super) step: DVec2,
+    pub(super) crs: Crs,
+    pub(super) bands: Vec<Vec<f64>>,
+    pub(super) source: Source,
+    pub(super) notes: Vec<String>,
+}
+
+impl Raster {
+    /// Turns the rows so that the first is the northernmost, and gives the frame.
+    pub(super) fn turn_north_up(&mut self, path: &Path) -> Result<GridFrame> {
+        if self.step.x < 0.0 {
+            return Err(Error::unsupported_file(
+                path,
+                "the columns run from east to west",
+                "turn the raster with `gdalwarp IN OUT.tif`",
+            ));
+        }
+        if self.step.y > 0.0 {
+            self.origin.y += self.step.y * (self.rows - 1) as f64;
+            for band in &mut self.bands {
+                reverse_rows(band, self.cols);
+            }
+            self.source.south_up = true;
+            self.notes
+                .push("the rows of the file run from south to north; they were turned".to_owned());
+        }
+        self.step.y = self.step.y.abs();
+        if self.crs.is_none() {
+            self.guess_crs();
+        }
+        GridFrame::new(self.cols, self.rows, self.origin, self.step, self.crs.ground())
+            .map_err(|e| e.in_file(path))
+    }
+
+    /// Without a CRS, coordinates that look like degrees are taken for degrees: as metres they would make
+    /// every slope a wall.
+    fn guess_crs(&mut self) {
+        let note = match Crs::from_epsg(4326) {
+            Ok(wgs84) if self.looks_like_degrees() => {
+                self.crs = wgs84;
+                "the file names no CRS; its coordinates look like degrees and are taken as WGS84 \
+                 longitude and latitude"
+            }
+            _ => {
+                "the file names no CRS; map units are taken as metres, and there is no way to longitude and latitude"
+            }
+        };
+        self.notes.push(note.to_owned());
+    }
+
+    /// Whether the coordinates could be degrees and the cells are small; `step` is positive.
+    fn looks_like_degrees(&self) -> bool {
+        /// Degrees; two kilometres.
+        const LARGEST_CELL: f64 = 0.02;
+        let half = self.step * DVec2::new(self.cols as f64, -(self.rows as f64)) / 2.0;
+        let middle = self.origin + half;
+        let within = (middle.abs() + half.abs()).cmple(DVec2::new(360.0, 90.0)).all();
+        // Scans of models have small cells too, but begin or are centred at the origin.
+        let near_zero =
+            |p: DVec2| p.cmple(1.5 * self.step).all() && p.cmpge(-1.5 * self.step).all();
+        let local = near_zero(middle) || near_zero(middle - half.abs());
+        within && !local && self.step.max_element() < LARGEST_CELL
+    }
+}
+
+/// Reverses the order of rows.
+fn reverse_rows(values: &mut [f64], cols: usize) {
+    let rows = values.len() / cols;
+    let (upper, lower) = values.split_at_mut(rows.div_ceil(2) * cols);
+    for (a, b) in upper.chunks_exact_mut(cols).zip(lower.chunks_exact_mut(cols).rev()) {
+        a.swap_with_slice(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_reverse() {
+        let mut values = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        reverse_rows(&mut values, 2);
+        assert_eq!(values, [5.0, 6.0, 3.0, 4.0, 1.0, 2.0]);
+        reverse_rows(&mut values, 3);
+        assert_eq!(values, [4.0, 1.0, 2.0, 5.0, 6.0, 3.0]);
+    }
+}

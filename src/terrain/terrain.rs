@@ -1,0 +1,258 @@
+//! Heights in metres at the nodes of a grid.
+
+use std::path::Path;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::formats::{self, ReadMode};
+use super::raster::void_infinite;
+use super::{Crs, Georeference};
+use crate::error::{Error, Result};
+use crate::grid::GridFrame;
+
+/// Heights at the nodes of a grid, in metres; `NaN` marks a void.
+///
+/// Row 0 is the northernmost, whatever the file's order was.
+#[derive(Clone, Debug)]
+pub struct Terrain {
+    georeference: Georeference,
+    heights: Vec<f64>,
+    notes: Vec<String>,
+    source: Source,
+}
+
+/// What the file said of itself, for `info`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// Name of the format, such as `GeoTIFF` or `ESRI ASCII grid`.
+    pub format: String,
+    /// Sample type as stored, such as `int16`.
+    pub sample: String,
+    /// Unit of the stored heights, such as `metre` or `US survey foot`.
+    pub height_unit: String,
+    /// Metres in one such unit.
+    pub metres_per_height_unit: f64,
+    /// The nodata value of the file, as written.
+    pub nodata: Option<String>,
+    /// Whether the rows of the file ran from south to north and were turned.
+    pub south_up: bool,
+}
+
+impl Default for Source {
+    /// Heights in metres that come from no file.
+    fn default() -> Self {
+        Self {
+            format: "memory".to_owned(),
+            sample: "float64".to_owned(),
+            height_unit: "metre".to_owned(),
+            metres_per_height_unit: 1.0,
+            nodata: None,
+            south_up: false,
+        }
+    }
+}
+
+impl Terrain {
+    /// Heights in metres, row by row from the north; `NaN` or infinite cells become voids.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if the number of heights is not that of the frame's nodes.
+    pub fn new(frame: GridFrame, mut heights: Vec<f64>, crs: Crs) -> Result<Self> {
+        if heights.len() != frame.nodes() {
+            let expected = format!(
+                "{}, that of the nodes of a grid of {} × {}",
+                frame.nodes(),
+                frame.cols(),
+                frame.rows()
+            );
+            return Err(Error::argument("the number of heights", heights.len(), expected));
+        }
+        void_infinite(&mut heights);
+        Ok(Self {
+            georeference: Georeference::new(frame, crs),
+            heights,
+            notes: Vec::new(),
+            source: Source::default(),
+        })
+    }
+
+    /// Reads a DEM. The format is told by content first, by extension second.
+    ///
+    /// # Errors
+    /// [`Error::Format`], [`Error::Unsupported`], [`Error::TooLarge`] or [`Error::Io`]: a file that is damaged, of a kind that
+    /// is not read, or does not say how big its cells are on the ground; each says what to do.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let mut raster = formats::read(path, ReadMode::Heights)?;
+        let frame = raster.turn_north_up(path)?;
+        let mut heights = raster.bands.swap_remove(0);
+        let metres = raster.source.metres_per_height_unit;
+        if metres != 1.0 {
+            heights.par_iter_mut().for_each(|h| *h *= metres);
+        }
+        let mut terrain = Self::new(frame, heights, raster.crs)?;
+        terrain.notes = raster.notes;
+        terrain.source = raster.source;
+        terrain.notes.extend(terrain.note_of_heights());
+        terrain.notes.extend(terrain.crs().caveat().map(str::to_owned));
+        terrain.notes.extend(terrain.note_of_distortion());
+        Ok(terrain)
+    }
+
+    /// Where the nodes lie on the map and on the Earth. A clone of it outlives the heights.
+    #[must_use]
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
+    }
+
+    /// The grid.
+    #[must_use]
+    pub fn frame(&self) -> &GridFrame {
+        self.georeference.frame()
+    }
+
+    /// Heights in metres, row-major from the north-west; `NaN` where void.
+    #[must_use]
+    pub fn heights(&self) -> &[f64] {
+        &self.heights
+    }
+
+    /// The coordinate reference system.
+    #[must_use]
+    pub fn crs(&self) -> &Crs {
+        self.georeference.crs()
+    }
+
+    /// Things the reader noticed that a user should know, a sentence each.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// What the file said of itself.
+    #[must_use]
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Whether the node is a void.
+    ///
+    /// # Panics
+    /// If it is not on the grid.
+    #[must_use]
+    pub fn is_void(&self, col: usize, row: usize) -> bool {
+        self.heights[self.frame().index(col, row)].is_nan()
+    }
+
+    /// Number of voids, and smallest, largest and mean height in metres (`None` if all are void).
+    #[must_use]
+    pub fn statistics(&self) -> (usize, Option<[f64; 3]>) {
+        let rows: Vec<_> =
+            self.heights.par_chunks(self.frame().cols()).map(Statistics::of_row).collect();
+        // Added row by row, so that the sum does not depend on the number of threads.
+        let all = rows.into_iter().fold(Statistics::NONE, Statistics::and);
+        let voids = self.heights.len() - all.count;
+        (voids, (all.count > 0).then(|| [all.min, all.max, all.sum / all.count as f64]))
+    }
+
+    /// See [`Georeference::to_lonlat`].
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is no CRS or the point cannot be projected.
+    pub fn to_lonlat(&self, at: DVec2) -> Result<DVec2> {
+        self.georeference.to_lonlat(at)
+    }
+
+    /// See [`Georeference::from_lonlat`].
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is no CRS or the point cannot be projected.
+    pub fn from_lonlat(&self, lonlat: DVec2) -> Result<DVec2> {
+        self.georeference.from_lonlat(lonlat)
+    }
+
+    /// Says so if no terrain has such heights.
+    fn note_of_heights(&self) -> Option<String> {
+        /// No body of the solar system has ground this many metres from its datum.
+        const HIGHEST: f64 = 1e5;
+        match self.statistics().1 {
+            None => Some("every cell is void: there is no terrain to work on".to_owned()),
+            Some([lowest, highest, _]) if highest.max(-lowest) > HIGHEST => Some(format!(
+                "heights run from {lowest:e} to {highest:e} m, which no terrain does; is a nodata value not declared?"
+            )),
+            Some(_) => None,
+        }
+    }
+
+    /// Says so if lengths on the map, which distances are measured in, are not those on the ground.
+    fn note_of_distortion(&self) -> Option<String> {
+        const NOTABLE: f64 = 0.01;
+        let [least, most] = self.georeference.ground_per_map_metre()?;
+        (least < 1.0 - NOTABLE || most > 1.0 + NOTABLE).then(|| {
+            format!(
+                "a metre of this map is {least:.2} to {most:.2} m on the ground, and distances are those of the map; \
+                 reproject with `gdalwarp -t_srs` to longitude and latitude or to the UTM zone for those of the ground"
+            )
+        })
+    }
+}
+
+/// Sums over heights; voids do not count.
+struct Statistics {
+    count: usize,
+    min: f64,
+    max: f64,
+    sum: f64,
+}
+
+impl Statistics {
+    const NONE: Self = Self { count: 0, min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0 };
+
+    fn of_row(row: &[f64]) -> Self {
+        row.iter().filter(|h| !h.is_nan()).fold(Self::NONE, |all, &h| Self {
+            count: all.count + 1,
+            min: if h < all.min { h } else { all.min },
+            max: if h > all.max { h } else { all.max },
+            sum: all.sum + h,
+        })
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+            sum: self.sum + other.sum,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::Ground;
+
+    fn frame(cols: usize, rows: usize) -> GridFrame {
+        GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap()
+    }
+
+    #[test]
+    fn infinite_and_nan_heights_are_voids() {
+        let heights = vec![1.0, f64::NAN, f64::INFINITY, 5.0];
+        let terrain = Terrain::new(frame(2, 2), heights, Crs::none()).unwrap();
+        assert!(terrain.is_void(1, 0) && terrain.is_void(0, 1) && !terrain.is_void(1, 1));
+        assert_eq!(terrain.statistics(), (2, Some([1.0, 5.0, 3.0])));
+        let void = Terrain::new(frame(1, 1), vec![f64::NAN], Crs::none()).unwrap();
+        assert_eq!(void.statistics(), (1, None));
+        let error = Terrain::new(frame(2, 2), vec![0.0; 3], Crs::none()).unwrap_err();
+        assert!(error.to_string().starts_with("the number of heights is 3; it must be 4"));
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let error = Terrain::open("no/such/dem.tif").unwrap_err();
+        assert!(matches!(error, Error::Io { .. }));
+        assert!(error.to_string().contains("no/such/dem.tif"));
+    }
+}
