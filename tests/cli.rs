@@ -412,8 +412,8 @@ fn bad_input_is_named() {
     folder.bad(
         "info notes.txt",
         2,
-        "notes.txt: not a DEM of a format that is read (GeoTIFF, ESRI ASCII grid, SRTM .hgt): \
-         it begins with bytes [68, 65, 6c, 6c, 6f, 0a]",
+        "notes.txt: the file is of no known format: it begins with bytes [68, 65, 6c, 6c, 6f, 0a]; \
+         it must be GeoTIFF, ESRI ASCII grid or SRTM HGT",
     );
     folder.write("empty.geojson", r#"{"type":"FeatureCollection","features":[]}"#);
     folder.bad(

@@ -69,7 +69,7 @@ struct Subject<'a> {
 }
 
 enum Ground<'a> {
-    Heights(Box<Journey<'a>>, Terrain),
+    Heights(Box<Journey<'a>>, Box<Terrain>),
     Nurbs(Box<NurbsGrid>),
 }
 
@@ -104,7 +104,7 @@ impl<'a> Subject<'a> {
             let metric = journey.field(name, control)?;
             let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
             drop(metric);
-            (Ground::Heights(Box::new(journey), terrain), ranks, field)
+            (Ground::Heights(Box::new(journey), Box::new(terrain)), ranks, field)
         };
         let surface = ground.surface();
         let (regions, solver) = (&args.regions, args.ground.metric.solver());

@@ -9,15 +9,12 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::{Format, Head, ReadMode};
-use crate::error::{Location, Mismatch, Result};
+use crate::error::{Error, Location, Result};
 use crate::terrain::raster::Raster;
 use crate::terrain::{Crs, Source};
 
 pub(super) const FORMAT: Format =
     Format { name: "ESRI ASCII grid", is_own: begins_with_keyword, extensions: &["asc"], read };
-
-/// What is wrong; [`read`] adds the path.
-type Checked<T> = std::result::Result<T, Mismatch>;
 
 /// What a grid without a `NODATA_value` line marks voids with.
 const DEFAULT_NODATA: f64 = -9999.0;
@@ -28,7 +25,7 @@ fn begins_with_keyword(head: &Head) -> bool {
 }
 
 fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
-    let (header, grid, heights) = parse(bytes).map_err(|mismatch| mismatch.in_file(path))?;
+    let (header, grid, heights) = parse(bytes).map_err(|error| error.in_file(path))?;
     let mut notes = Vec::new();
     if header.nodata.is_none() && heights.iter().any(|h| h.is_nan()) {
         notes.push(
@@ -53,7 +50,7 @@ fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
 }
 
 /// The header, what it comes to, and the cells.
-fn parse(bytes: &[u8]) -> Checked<(Header, Grid, Vec<f64>)> {
+fn parse(bytes: &[u8]) -> Result<(Header, Grid, Vec<f64>)> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut tokens = bytes.split(u8::is_ascii_whitespace).filter(|t| !t.is_empty()).peekable();
     let mut header = Header::default();
@@ -63,7 +60,7 @@ fn parse(bytes: &[u8]) -> Checked<(Header, Grid, Vec<f64>)> {
         let token = tokens.next().unwrap_or_default();
         let value = number(token).ok_or_else(|| {
             let what = format!("the value of `{word}` in the header");
-            Mismatch::new(what, quoted(token), "a number")
+            Error::argument(what, quoted(token), "a number")
         })?;
         header.set(&word, value)?;
     }
@@ -117,7 +114,7 @@ struct Grid {
 }
 
 impl Header {
-    fn set(&mut self, keyword: &str, value: f64) -> Checked<()> {
+    fn set(&mut self, keyword: &str, value: f64) -> Result<()> {
         match keyword {
             "ncols" => self.cols = Some(value),
             "nrows" => self.rows = Some(value),
@@ -131,7 +128,7 @@ impl Header {
             "nodata_value" | "nodata" => self.nodata = Some(value),
             _ => {
                 let expected = "one of an ESRI ASCII grid, such as `ncols`";
-                return Err(Mismatch::new(
+                return Err(Error::argument(
                     "a keyword of the header",
                     format!("`{keyword}`"),
                     expected,
@@ -142,12 +139,12 @@ impl Header {
     }
 
     /// Bounds the number of cells by the size of the file, so that none is allocated for which there is no byte.
-    fn check(&self, bytes: usize) -> Checked<Grid> {
+    fn check(&self, bytes: usize) -> Result<Grid> {
         let cols = count(self.cols, "ncols")?;
         let rows = count(self.rows, "nrows")?;
         if cols * rows > bytes / 2 + 1 {
             let found = format!("{cols} × {rows}, more than the file's {bytes} bytes can hold");
-            return Err(Mismatch::new(
+            return Err(Error::argument(
                 "the number of cells in the header",
                 found,
                 "what the file holds",
@@ -157,7 +154,7 @@ impl Header {
         let cell = DVec2::new(present(self.dx, "cellsize")?, present(self.dy, "cellsize")?);
         if !cell.is_finite() || cell.min_element() <= 0.0 {
             let found = format!("{} × {}", cell.x, cell.y);
-            return Err(Mismatch::new("the cell size", found, "positive"));
+            return Err(Error::argument("the cell size", found, "positive"));
         }
         let x = present(self.x, "xllcorner` or `xllcenter")?.centre(cell.x);
         let south = present(self.y, "yllcorner` or `yllcenter")?.centre(cell.y);
@@ -167,29 +164,29 @@ impl Header {
 }
 
 /// The value of a keyword that a grid cannot do without.
-fn present<T>(value: Option<T>, keyword: &str) -> Checked<T> {
+fn present<T>(value: Option<T>, keyword: &str) -> Result<T> {
     value.ok_or_else(|| {
-        Mismatch::new(format!("the value of `{keyword}` in the header"), "missing", "a number")
+        Error::argument(format!("the value of `{keyword}` in the header"), "missing", "a number")
     })
 }
 
 /// A whole number of at least 1.
-fn count(value: Option<f64>, keyword: &str) -> Checked<usize> {
+fn count(value: Option<f64>, keyword: &str) -> Result<usize> {
     let value = present(value, keyword)?;
     // Beyond 2³² the product with the other count could overflow, and no file has so many.
     if value.fract() == 0.0 && (1.0..4_294_967_296.0).contains(&value) {
         Ok(value as usize)
     } else {
-        Err(Mismatch::new(format!("`{keyword}`"), value, "a whole number of at least 1"))
+        Err(Error::argument(format!("`{keyword}`"), value, "a whole number of at least 1"))
     }
 }
 
 /// The cells in metres, voids as `NaN`.
-fn cells<'a>(tokens: impl Iterator<Item = &'a [u8]>, grid: &Grid) -> Checked<Vec<f64>> {
+fn cells<'a>(tokens: impl Iterator<Item = &'a [u8]>, grid: &Grid) -> Result<Vec<f64>> {
     let due = grid.cols * grid.rows;
     let wrong_count = |found: String, advice| {
         let expected = format!("{due}, that of {} × {} cells of the header", grid.cols, grid.rows);
-        Mismatch::new("the number of heights", found, expected).advise(advice)
+        Error::argument("the number of heights", found, expected).advise(advice)
     };
     let mut heights = Vec::with_capacity(due);
     for token in tokens {
@@ -198,7 +195,7 @@ fn cells<'a>(tokens: impl Iterator<Item = &'a [u8]>, grid: &Grid) -> Checked<Vec
             return Err(wrong_count(format!("more than {due}"), "is `ncols` or `nrows` wrong?"));
         }
         let height = number(token).ok_or_else(|| {
-            Mismatch::new("the height", quoted(token), "a number")
+            Error::argument("the height", quoted(token), "a number")
                 .at(Location::Node { col: at % grid.cols, row: at / grid.cols })
         })?;
         heights.push(if height == grid.nodata { f64::NAN } else { height });

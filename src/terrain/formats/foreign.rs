@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::Head;
-use crate::error::{Error, Mismatch, Result};
+use crate::error::{Error, Result};
 
 const CONVERT: &str = "convert it with `gdal_translate IN OUT.tif`";
 
@@ -29,11 +29,11 @@ const EXTENSIONS: [&str; 7] = ["flt", "bil", "bip", "bsq", "xyz", "csv", "dem"];
 pub(super) fn refuse_stand_in(path: &Path, head: &Head) -> Result<()> {
     let begins = |start: &str| head.text.starts_with(start);
     if begins("<!doctype html") || begins("<html") {
-        let page = Mismatch::new("the file", "an HTML page", "a DEM");
+        let page = Error::argument("the file", "an HTML page", "a DEM");
         return Err(page.advise("the download went wrong: fetch the file again").in_file(path));
     }
     if begins("version https://git-lfs") {
-        let pointer = Mismatch::new("the file", "a Git LFS pointer", "the DEM itself");
+        let pointer = Error::argument("the file", "a Git LFS pointer", "the DEM itself");
         return Err(pointer.advise("fetch it with `git lfs pull`").in_file(path));
     }
     Ok(())

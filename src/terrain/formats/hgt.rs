@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::{Format, Head, ReadMode};
-use crate::error::{Mismatch, Result};
+use crate::error::{Error, Result};
 use crate::terrain::raster::Raster;
 use crate::terrain::{Crs, Source};
 
@@ -49,12 +49,12 @@ fn read_tile(path: &Path, bytes: &[u8]) -> Result<Raster> {
         let expected =
             "2884802 or 25934402 bytes, for 1201 × 1201 or 3601 × 3601 cells of two bytes";
         let found = format!("{} bytes", bytes.len());
-        return Err(Mismatch::new("the size of the tile", found, expected).in_file(path));
+        return Err(Error::argument("the size of the tile", found, expected).in_file(path));
     };
     let Some(corner) = south_west_corner(path) else {
         let expected = "that of its place, such as N42E001.hgt for 42° N 1° E";
         let found = format!("{}", path.file_name().unwrap_or_default().display());
-        return Err(Mismatch::new("the name of the tile", found, expected).in_file(path));
+        return Err(Error::argument("the name of the tile", found, expected).in_file(path));
     };
     let (cells, _) = bytes.as_chunks::<2>();
     let height = |cell: &[u8; 2]| match i16::from_be_bytes(*cell) {
@@ -103,7 +103,7 @@ fn gunzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
 
 /// Unpacks the one tile of a zip archive.
 fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
-    let damaged = |e: zip::result::ZipError| Mismatch::damaged("the zip archive", e).in_file(path);
+    let damaged = |e: zip::result::ZipError| Error::damaged("the zip archive", e).in_file(path);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
     for i in 0..archive.len() {
         let file = archive.by_index(i).map_err(damaged)?;
@@ -112,7 +112,7 @@ fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
         }
     }
     let expected = "1 or more";
-    Err(Mismatch::new("the number of .hgt files in the zip archive", 0, expected).in_file(path))
+    Err(Error::argument("the number of .hgt files in the zip archive", 0, expected).in_file(path))
 }
 
 /// Unpacks to the size of the largest tile and a byte more, whatever the archive claims.
@@ -121,7 +121,7 @@ fn at_most_a_tile(path: &Path, stream: impl Read) -> Result<Vec<u8>> {
     stream
         .take(LARGEST + 1)
         .read_to_end(&mut tile)
-        .map_err(|e| Mismatch::damaged("the compressed tile", e).in_file(path))?;
+        .map_err(|e| Error::damaged("the compressed tile", e).in_file(path))?;
     Ok(tile)
 }
 

@@ -13,7 +13,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use super::raster::Raster;
-use crate::error::{Error, Mismatch, Result};
+use crate::error::{Error, Result};
 
 /// All formats, in the order in which a file is offered to them: those that know their own beyond doubt first.
 const FORMATS: [Format; 3] = [geotiff::FORMAT, ascii_grid::FORMAT, hgt::FORMAT];
@@ -96,7 +96,7 @@ pub(super) fn read(path: &Path, mode: ReadMode) -> Result<Raster> {
 /// The format of a file that begins with `bytes`, or what is wrong with it.
 fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format> {
     if bytes.is_empty() {
-        return Err(Mismatch::new("the file", "empty", "a DEM").in_file(path));
+        return Err(Error::argument("the file", "empty", "a DEM").in_file(path));
     }
     let head = Head::new(path, bytes);
     foreign::refuse_stand_in(path, &head)?;
@@ -108,7 +108,7 @@ fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format> {
     FORMATS.iter().find(named).ok_or_else(|| {
         let [names @ .., last] = FORMATS.each_ref().map(|format| format.name);
         let first = &bytes[..bytes.len().min(8)];
-        Mismatch::new(
+        Error::argument(
             "the file",
             format!("of no known format: it begins with bytes {first:02x?}"),
             format!("{} or {last}", names.join(", ")),

@@ -2,7 +2,7 @@
 
 use super::directory::{Directory, Entry};
 use super::error::{TiffResult, damaged};
-use crate::error::{Location, Mismatch};
+use crate::error::{Error, Location};
 
 /// Whether a file that begins with `bytes` is a TIFF or BigTIFF.
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
@@ -65,10 +65,14 @@ impl<'a> Tiff<'a> {
         });
         let Some((count, after)) = extent else {
             let within = format!("within the {} bytes of the file", self.bytes.len());
-            return Err(Mismatch::new("the end of the image directory", "beyond the file", within)
-                .at(Location::Byte(at))
-                .advise("the file is cut short or damaged")
-                .into());
+            return Err(Error::argument(
+                "the end of the image directory",
+                "beyond the file",
+                within,
+            )
+            .at(Location::Byte(at))
+            .advise("the file is cut short or damaged")
+            .into());
         };
         let entries = (0..count).filter_map(|i| self.entry(table + i * entry_size)).collect();
         // A file may end right after its last directory: no link is no further image.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::container::Tiff;
 use super::error::{TiffResult, damaged};
-use crate::error::Mismatch;
+use crate::error::Error;
 
 /// One image of the file: the entries of its directory, by tag.
 pub(crate) struct Directory<'a> {
@@ -30,7 +30,7 @@ impl<'a> Directory<'a> {
         let Some(entry) = self.entries.iter().find(|e| e.tag == tag) else { return Ok(None) };
         match entry.values {
             Some(values) => Ok(Some((entry.kind, values))),
-            None => Err(Mismatch::new(
+            None => Err(Error::argument(
                 format!("the number of values of tag {tag}"),
                 entry.count,
                 "no more than the file holds",

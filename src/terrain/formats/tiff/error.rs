@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Mismatch};
+use crate::error::Error;
 
 /// Why a TIFF cannot be read; the caller adds the path.
 #[derive(Debug)]
 pub(crate) enum TiffError {
     /// The file contradicts itself.
-    Damaged(Mismatch),
+    Damaged(Error),
     /// The file is in order but of a kind that is not read.
     Unsupported {
         /// What it holds.
@@ -32,7 +32,7 @@ impl TiffError {
     /// The same with the file it was found in.
     pub(crate) fn in_file(self, path: &Path) -> Error {
         match self {
-            Self::Damaged(mismatch) => mismatch.in_file(path),
+            Self::Damaged(error) => error.in_file(path),
             Self::Unsupported { found, advice } => Error::unsupported_file(path, found, advice),
             Self::Crs(error) => error.unsupported_in(path),
             Self::TooLarge { bytes } => Error::TooLarge {
@@ -44,9 +44,9 @@ impl TiffError {
     }
 }
 
-impl From<Mismatch> for TiffError {
-    fn from(mismatch: Mismatch) -> Self {
-        Self::Damaged(mismatch)
+impl From<Error> for TiffError {
+    fn from(error: Error) -> Self {
+        Self::Damaged(error)
     }
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn damaged<T>(
     found: impl std::fmt::Display,
     expected: impl Into<String>,
 ) -> TiffResult<T> {
-    Err(Mismatch::new(what, found, expected).into())
+    Err(TiffError::Damaged(Error::argument(what, found, expected)))
 }
 
 /// A [`TiffError::Unsupported`].

@@ -9,7 +9,7 @@ use super::error::{TiffError, TiffResult, damaged, unsupported};
 use super::predictor::Predictor;
 use super::sample::Sample;
 use super::tag;
-use crate::error::Mismatch;
+use crate::error::Error;
 
 /// How the samples of one image are laid out in the file.
 pub(crate) struct Layout<'a> {
@@ -169,7 +169,7 @@ impl<'a> Layout<'a> {
         }
         let chunk = format!("{} {index}", if self.chunks.tiled { "tile" } else { "strip" });
         let Some(stored) = self.tiff.slice(offset, count) else {
-            return Err(Mismatch::new(
+            return Err(Error::argument(
                 format!("the end of {chunk}"),
                 format!("byte {}", offset.saturating_add(count)),
                 format!("within the {} bytes of the file", self.tiff.bytes.len()),
@@ -185,8 +185,7 @@ impl<'a> Layout<'a> {
                 format!("enough to expand to {length}"),
             );
         }
-        let mut bytes =
-            self.codec.expand(stored, length).map_err(|e| Mismatch::damaged(chunk, e))?;
+        let mut bytes = self.codec.expand(stored, length).map_err(|e| Error::damaged(chunk, e))?;
         for row in bytes.chunks_exact_mut(self.row_bytes()) {
             self.predictor.undo(row, self.sample, self.interleaved(), self.tiff.big_endian);
         }
