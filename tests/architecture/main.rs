@@ -32,15 +32,12 @@ const KNOWN_ARROWS: &[&str] = &["metric → eikonal"];
 const KNOWN_CIRCLES: &[&str] = &[
     "cli",
     "eikonal",
-    "eikonal/correction",
-    "eikonal/tile",
-    "metric",
-    "route",
+    "eikonal/schedule",
+    "eikonal/second_order",
     "surface",
     "surface/bspline",
-    "surface/nurbs",
     "terrain",
-    "terrain/crs",
+    "terrain/formats/tiff",
 ];
 
 #[test]
@@ -128,15 +125,19 @@ impl House {
         format!("{from}:{} imports {} of {to}", import.line, import.path)
     }
 
-    /// The circles, with the imports that make them.
+    /// The circles, with the imports that make them. A `mod.rs` is in none: it shows what its files own, and owns what
+    /// they share.
     fn circles(&self) -> String {
         // By folder, which of its files and folders imports which, and by what.
         let mut folders = BTreeMap::<PathBuf, BTreeMap<[String; 2], &Import>>::new();
         for import in &self.imports {
             let [from, to] = [import.from, import.to].map(|module| self.place(module));
             let common = from.iter().zip(&to).take_while(|(from, to)| from == to).count();
-            if common > 0 && common < from.len() {
-                let arrow = [from[common].clone(), to[common].clone()];
+            if common == 0 || from == to {
+                continue; // Between folders of `src`, or within a file.
+            }
+            let arrow = [from[common].clone(), to[common].clone()];
+            if !arrow.iter().any(|name| name == "mod") {
                 let folder = from[..common].iter().collect();
                 folders.entry(folder).or_default().entry(arrow).or_insert(import);
             }
