@@ -29,25 +29,25 @@ impl CancelToken {
 /// Called with the name of the stage and the share of it that is done, 0 to 1.
 pub type Progress = Arc<dyn Fn(&str, f64) + Send + Sync>;
 
-/// How to run: whom to ask for cancelling, whom to tell of progress.
+/// How to run: where to look for a request to cancel, where to report progress.
 #[derive(Clone, Default)]
 pub struct Control {
     /// Checked often while surfaces are fitted, metrics sampled, distances solved, regions cut and maps painted; not while files
     /// are read and routes traced.
     pub cancel: CancelToken,
-    /// Told of progress; `None` (the default) for silence.
+    /// Called with progress; `None` (the default) for silence.
     pub progress: Option<Progress>,
 }
 
 impl Control {
-    /// Tells that a share `done` (0 to 1) of `stage` is complete.
+    /// Reports that a share `done` (0 to 1) of `stage` is complete.
     pub fn report(&self, stage: &str, done: f64) {
         if let Some(progress) = &self.progress {
             progress(stage, done);
         }
     }
 
-    /// The same for a part of the work that is not to be told of.
+    /// The same for a part of the work whose progress is not reported.
     pub(crate) fn quiet(&self) -> Self {
         Self { cancel: self.cancel.clone(), progress: None }
     }

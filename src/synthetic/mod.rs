@@ -8,7 +8,7 @@
 //! Heights have the same bits on every run, thread count and platform.
 //!
 //! ```
-//! use ridgeway::terrain::synthetic::{Synthetic, SyntheticKind};
+//! use ridgeway::synthetic::{Synthetic, SyntheticKind};
 //!
 //! # fn main() -> ridgeway::Result<()> {
 //! let trough = Synthetic::new(SyntheticKind::Cylinder, 201, 101, 10.0)?;
