@@ -31,3 +31,56 @@ pub(crate) fn least(a: f32, b: f32) -> f32 {
 pub(crate) fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
+
+/// `1/√x` to five digits, from the bits of `x` and two Newton steps; a fraction of the time of a root and a division, and
+/// the same on every machine.
+#[inline(always)]
+pub(crate) fn inverse_root(x: f32) -> f32 {
+    let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
+    for _ in 0..2 {
+        y *= 1.5 - 0.5 * x * y * y;
+    }
+    y
+}
+
+/// Yes or no, as the bits of a lane: all set or none.
+///
+/// Values are chosen bit by bit. A branch between values in memory becomes one between their addresses, and the loop around it is not
+/// vectorised without gathers: for AVX2 high accuracy took 2.5 times as long.
+#[derive(Clone, Copy)]
+pub(crate) struct Mask(u32);
+
+impl Mask {
+    /// Whether a bit of `bits` is set.
+    #[inline(always)]
+    pub(crate) fn of(bits: u32, bit: u32) -> Self {
+        Self(((bits << (31 - bit.trailing_zeros())) as i32 >> 31) as u32)
+    }
+
+    #[inline(always)]
+    pub(crate) fn choose(self, yes: f32, no: f32) -> f32 {
+        f32::from_bits(yes.to_bits() & self.0 | no.to_bits() & !self.0)
+    }
+
+    /// `value`, negated if yes.
+    #[inline(always)]
+    pub(crate) fn negate(self, value: f32) -> f32 {
+        f32::from_bits(value.to_bits() ^ (self.0 & 1 << 31))
+    }
+
+    #[inline(always)]
+    pub(crate) fn differs(self, other: Self) -> Self {
+        Self(self.0 ^ other.0)
+    }
+
+    #[inline(always)]
+    pub(crate) fn is_yes(self) -> bool {
+        self.0 != 0
+    }
+}
+
+/// As [`choose`], but never a branch: see [`Mask`].
+#[inline(always)]
+pub(crate) fn choose_bits(yes: bool, a: f32, b: f32) -> f32 {
+    Mask(0u32.wrapping_sub(u32::from(yes))).choose(a, b)
+}

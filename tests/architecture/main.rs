@@ -33,7 +33,6 @@ const KNOWN_CIRCLES: &[&str] = &[
     "cli",
     "eikonal",
     "eikonal/schedule",
-    "eikonal/second_order",
     "surface",
     "surface/bspline",
     "terrain",

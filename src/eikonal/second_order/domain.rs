@@ -5,10 +5,9 @@ use rayon::prelude::*;
 use super::super::field::{AREA, SIDE, Tiling};
 use super::super::sides::neighbours;
 use super::super::stencil::UNREACHED;
-use super::FirstOrder;
 use super::feet::{Feet, Input, Surroundings};
+use super::first_order::FirstOrder;
 use super::halo::STRIP;
-use super::transport::carry;
 use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::lanes::least;
@@ -66,7 +65,7 @@ impl<'a> Domain<'a> {
     }
 
     /// Adds the strip that a tile lies in.
-    fn add(&mut self, tile: usize) {
+    pub(super) fn add(&mut self, tile: usize) {
         let (strip, place) = self.place(tile);
         if self.places[strip].is_none() {
             self.places[strip] = Some(self.strips.len() as u32);
@@ -95,29 +94,12 @@ impl<'a> Domain<'a> {
         Some((&strip.feet[place], strip.reads[place]))
     }
 
-    /// A round of correction, from the correction `e` that was there before the edit. `total` is that of the rounds before;
-    /// none in the first.
-    pub(super) fn round(
-        &mut self,
-        mut e: Vec<[f32; AREA]>,
-        total: Option<&[[f32; AREA]]>,
-        tolerance_cells: f32,
-        control: &Control,
-    ) -> Result<Vec<[f32; AREA]>> {
-        let tolerance = tolerance_cells * self.solution.field.mean_step;
-        loop {
-            let order = self.find(total, control)?;
-            let (carried, beyond) = carry(self, &order, e, tolerance, control)?;
-            if beyond.is_empty() {
-                return Ok(carried);
-            }
-            e = carried;
-            beyond.into_iter().for_each(|tile| self.add(tile));
-        }
-    }
-
     /// Finds the feet of strips that have none of this round; the reached tiles of these in order of distance.
-    fn find(&mut self, total: Option<&[[f32; AREA]]>, control: &Control) -> Result<Vec<u32>> {
+    pub(super) fn find(
+        &mut self,
+        total: Option<&[[f32; AREA]]>,
+        control: &Control,
+    ) -> Result<Vec<u32>> {
         let rounds = 1 + usize::from(total.is_some());
         let behind = self.strips.iter().filter(|strip| strip.rounds < rounds);
         let tiles = behind.flat_map(|strip| strip.first..strip.first + strip.tiles);

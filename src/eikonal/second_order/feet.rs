@@ -2,17 +2,17 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use super::FirstOrder;
+use super::first_order::FirstOrder;
 use super::functional::{ConeAt, Foot};
 use super::halo::{MARGIN, Strip, WIDE, fill, rings_of, seen};
-use super::triangle::{LaneTriangle, choose};
+use super::triangle::LaneTriangle;
 use crate::eikonal::field::{AREA, SIDE};
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::{RING, ring_of};
 use crate::eikonal::tile::Tile;
 use crate::eikonal::tile::coefficients::{LaneLimits, factoring_terms, line_tensors};
 use crate::eikonal::tile::transpose::transpose;
-use crate::linalg::lanes::{Lanes, lanes};
+use crate::linalg::lanes::{Lanes, choose_bits as choose, lanes};
 use crate::linalg::simd::{self, Kernel};
 
 /// Where the values of a tile's nodes come from, and what the functional of second order adds there; by rows or, where

@@ -2,8 +2,7 @@
 //!
 //! All triangles are mirrored onto one: with the axis neighbour `a` at (1, 0) and the diagonal one `b` at (1, 1).
 
-use super::triangle::choose;
-use crate::linalg::lanes::{greatest, least};
+use crate::linalg::lanes::{choose_bits as choose, greatest, inverse_root, least};
 
 /// `vᵀMv` for `v = (1, θ)`: `α + 2βθ + γθ²`, that is `M` as xx, xy, yy.
 #[derive(Clone, Copy)]
@@ -28,17 +27,6 @@ impl Quadratic {
         let first = (self.1 + t * self.2) * inverse;
         [square * inverse, first, (self.2 - first * first) * inverse]
     }
-}
-
-/// `1/√x` to five digits, from the bits of `x` and two Newton steps; a fraction of the time of a root and a division, and
-/// the same on every machine.
-#[inline(always)]
-pub(super) fn inverse_root(x: f32) -> f32 {
-    let mut y = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
-    for _ in 0..2 {
-        y *= 1.5 - 0.5 * x * y * y;
-    }
-    y
 }
 
 /// The cone seen from a node at `v` from its point, times `on`.

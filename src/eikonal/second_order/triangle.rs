@@ -2,52 +2,10 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use super::functional::{Quadratic, inverse_root};
+use super::functional::Quadratic;
 use crate::eikonal::stencil::ring::{TRIANGLES, Triangle, without_cut_corners};
 use crate::eikonal::stencil::segment::ClosedForm;
-use crate::linalg::lanes::greatest;
-
-/// Yes or no, as the bits of a lane: all set or none.
-///
-/// Values are chosen bit by bit. A branch between values in memory becomes one between their addresses, and the loop around it is not
-/// vectorised without gathers: for AVX2 high accuracy took 2.5 times as long.
-#[derive(Clone, Copy)]
-pub(super) struct Mask(u32);
-
-impl Mask {
-    /// Whether a bit of `bits` is set.
-    #[inline(always)]
-    fn of(bits: u32, bit: u32) -> Self {
-        Self(((bits << (31 - bit.trailing_zeros())) as i32 >> 31) as u32)
-    }
-
-    #[inline(always)]
-    pub(super) fn choose(self, yes: f32, no: f32) -> f32 {
-        f32::from_bits(yes.to_bits() & self.0 | no.to_bits() & !self.0)
-    }
-
-    /// `value`, negated if yes.
-    #[inline(always)]
-    fn negate(self, value: f32) -> f32 {
-        f32::from_bits(value.to_bits() ^ (self.0 & 1 << 31))
-    }
-
-    #[inline(always)]
-    fn differs(self, other: Self) -> Self {
-        Self(self.0 ^ other.0)
-    }
-
-    #[inline(always)]
-    pub(super) fn is_yes(self) -> bool {
-        self.0 != 0
-    }
-}
-
-/// As [`Mask::choose`]: unlike the one of `linalg::lanes` never a branch.
-#[inline(always)]
-pub(super) fn choose(yes: bool, a: f32, b: f32) -> f32 {
-    Mask(0u32.wrapping_sub(u32::from(yes))).choose(a, b)
-}
+use crate::linalg::lanes::{Mask, choose_bits as choose, greatest, inverse_root};
 
 /// A [`Triangle`] in a lane.
 #[derive(Clone, Copy)]
