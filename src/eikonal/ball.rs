@@ -9,16 +9,19 @@ use std::iter::once;
 
 use glam::DVec2;
 
-use super::field::{SIDE, TensorField};
-use super::queue::Job;
-use super::sides::neighbours;
-use super::source::{self, Seeds};
-use super::stop::is_final;
+use super::factors::Factors;
+use super::schedule::active_set::Job;
+use super::schedule::memory::MemoryStore;
+use super::schedule::rounds::{End, Equation, Schedule};
+use super::schedule::stop::{Stop, is_final};
+use super::schedule::values::at_start;
+use super::solver::Solver;
+use super::source::{self, Seeds, StartRegion};
+use super::tensor_field::TensorField;
 use super::tile::kernel::Rule;
-use super::tiles::{self, Desk, End, Equation, Shared};
-use super::{Factors, Solver, StartRegion, Stop, unsettled};
 use crate::control::Control;
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::grid::tiling::SIDE;
 
 /// Finds one ball after the other.
 #[derive(Debug)]
@@ -26,7 +29,7 @@ pub(crate) struct Balls<'a> {
     field: &'a TensorField,
     /// As [`Solver::tolerance`].
     tolerance: f32,
-    desk: Desk,
+    schedule: Schedule<MemoryStore>,
     /// Start values of the ball, and the tiles that have some.
     seeds: Vec<Option<Box<Seeds>>>,
     seeded: Vec<usize>,
@@ -42,7 +45,7 @@ impl<'a> Balls<'a> {
         Self {
             field,
             tolerance: Solver::default().tolerance,
-            desk: Desk::empty(field.tiling),
+            schedule: Schedule::new(MemoryStore::unset(field.tiling), tiles, 0.0),
             seeds: vec![None; tiles],
             seeded: Vec::new(),
             opened: Vec::new(),
@@ -65,21 +68,20 @@ impl<'a> Balls<'a> {
         stop.check()?;
         self.clear();
         let largest = stop.largest(self.field);
-        let mut news = 0.0;
+        let mut least_change = 0.0;
         if self.field.is_open(col, row) {
             let start = [DVec2::new(col as f64, row as f64).into()];
             let factors = Factors::within(self.field, &start, largest.into());
-            let mut end = self.solve(&start, &factors, &stop, control)?;
-            if !end.settles && !factors.is_empty() {
-                self.clear();
-                end = self.solve(&start, &Factors::default(), &stop, control)?;
-            }
-            if !end.settles {
-                return Err(unsettled());
-            }
-            news = end.news;
+            let end = match self.solve(&start, &factors, &stop, control) {
+                Err(Error::NotConverged { .. }) if !factors.is_empty() => {
+                    self.clear();
+                    self.solve(&start, &Factors::default(), &stop, control)?
+                }
+                end => end?,
+            };
+            least_change = end.least_change;
         }
-        Ok(self.nodes(largest, news))
+        Ok(self.nodes(largest, least_change))
     }
 
     fn solve(
@@ -89,48 +91,52 @@ impl<'a> Balls<'a> {
         stop: &Stop,
         control: &Control,
     ) -> Result<End> {
-        let Self { field, tolerance, desk, seeds, seeded, opened, is_open } = self;
+        let Self { field, tolerance, schedule, seeds, seeded, opened, is_open } = self;
         *seeded = source::add_seeds(field, start, seeds)?;
         let equation = Equation { field, factors, seeds, tolerance: *tolerance };
         for &tile in &*seeded {
-            seeds[tile].iter().for_each(|seeds| desk.wake(&field.tiling, tile, seeds));
+            seeds[tile]
+                .iter()
+                .for_each(|seeds| schedule.activate_seeds(&field.tiling, tile, seeds));
         }
-        let open = |jobs: &[u64], shared: &Shared| {
+        let open = |jobs: &[u64], store: &MemoryStore| {
             let solved = jobs.iter().map(|&job| Job::from_bits(job).tile as usize);
-            let beside = |tile| neighbours(&field.tiling, tile).map(|(_, n)| n);
+            let beside = |tile| field.tiling.neighbours(tile).map(|(_, n)| n);
             for tile in solved.flat_map(|tile| once(tile).chain(beside(tile))) {
                 if !is_open[tile] {
                     is_open[tile] = true;
                     opened.push(tile);
-                    let values = tiles::at_start(&field.tiles[tile], seeds[tile].as_deref());
-                    shared.board.fill(tile, &values);
+                    let values = at_start(field.tensors(tile), seeds[tile].as_deref());
+                    store.values.fill(tile, &values);
                 }
             }
         };
-        tiles::relax(&equation, Rule::Lower, stop, desk, open, control)
+        schedule.run(&equation, Rule::Lower, stop, open, control)
     }
 
     /// Puts back what the last ball touched.
     fn clear(&mut self) {
-        self.desk.clear(&self.opened);
+        self.schedule.clear(&self.opened);
+        self.opened.iter().for_each(|&tile| self.schedule.store.forget_limits(tile));
         self.seeded.drain(..).for_each(|tile| self.seeds[tile] = None);
         self.opened.drain(..).for_each(|tile| self.is_open[tile] = false);
     }
 
-    /// The nodes with final values up to `largest`, while nothing below `news` is news.
-    fn nodes(&mut self, largest: f32, news: f32) -> impl Iterator<Item = (usize, f32)> {
+    /// The nodes with final values up to `largest`, while no value below `least_change` changes any more.
+    fn nodes(&mut self, largest: f32, least_change: f32) -> impl Iterator<Item = (usize, f32)> {
         self.opened.sort_unstable();
-        let Self { field, desk, opened, .. } = &*self;
+        let Self { field, schedule, opened, .. } = &*self;
         let (tiling, scale) = (&field.tiling, field.root_scale());
+        let store = &schedule.store;
         let of_line = move |tile: usize, line: usize| {
             let (row, col) = (tile / tiling.across * SIDE + line, tile % tiling.across * SIDE);
-            let limits = desk.shared.limits.at(tile);
-            let values = (0..SIDE).map(move |i| desk.shared.board.at(tile, line * SIDE + i));
-            (row * tiling.cols + col..)
-                .zip(values)
-                .filter(move |&(_, value)| value <= largest && is_final(value, &limits, news))
+            let limits = store.known_limits(tile);
+            let values = (0..SIDE).map(move |i| store.values.at(tile, line * SIDE + i));
+            (row * tiling.cols + col..).zip(values).filter(move |&(_, value)| {
+                value <= largest && is_final(value, &limits, least_change)
+            })
         };
-        let is_solved = |&&tile: &&usize| desk.is_solved(tile);
+        let is_solved = |&&tile: &&usize| schedule.is_solved(tile);
         let bands = opened.chunk_by(|a, b| a / tiling.across == b / tiling.across);
         let stored = bands.flat_map(move |band| {
             (0..SIDE).flat_map(move |line| {
@@ -148,7 +154,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::eikonal::field::AREA;
+    use crate::grid::tiling::AREA;
     use crate::linalg::Sym2;
 
     fn field(
@@ -261,10 +267,10 @@ mod tests {
                 let reached: BTreeSet<usize> = nodes.into_iter().map(tile).collect();
                 let is_beside = |tile, tiles: &BTreeSet<usize>| {
                     tiles.contains(&tile)
-                        || neighbours(&field.tiling, tile).any(|(_, n)| tiles.contains(&n))
+                        || field.tiling.neighbours(tile).any(|(_, n)| tiles.contains(&n))
                 };
                 let tiles: BTreeSet<usize> = balls.opened.iter().copied().collect();
-                let found = tiles.iter().copied().filter(|&tile| balls.desk.is_solved(tile));
+                let found = tiles.iter().copied().filter(|&tile| balls.schedule.is_solved(tile));
                 let found: BTreeSet<usize> = found.collect();
                 assert!(found.iter().all(|&tile| is_beside(tile, &reached)));
                 assert!(tiles.iter().all(|&tile| is_beside(tile, &found)));

@@ -5,9 +5,10 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::field::{SIDE, TensorField, TensorTile, Tiling};
 use super::source::{POINT_RADIUS, StartRegion};
 use super::stencil::factoring::{ALIKE, Factor, are_roots_within};
+use super::tensor_field::{TensorField, TensorTile};
+use crate::grid::tiling::{SIDE, Tiling};
 use crate::linalg::Sym2;
 use crate::linalg::lanes::{choose, greatest, lanes, least};
 use crate::linalg::simd::{self, Kernel};
@@ -166,7 +167,7 @@ impl Factor {
             }
             let from = tiling.first(tile) - self.at.round();
             let unlike = simd::dispatch(NearestUnlike {
-                tile: &field.tiles[tile],
+                tile: field.tensors(tile),
                 metric: self.metric,
                 from,
             });
@@ -193,7 +194,7 @@ impl Factor {
     fn images(self, tiling: &Tiling) -> impl Iterator<Item = Self> {
         let period = DVec2::new(tiling.cols as f64, tiling.rows as f64);
         let reach = period.min(DVec2::splat(self.radius));
-        let turns = tiling.turns(self.at, -reach, period - 1.0 + reach);
+        let turns = tiling.images(self.at, -reach, period - 1.0 + reach);
         turns.map(move |turn| Self { at: self.at + turn, ..self })
     }
 }

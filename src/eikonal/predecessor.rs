@@ -5,15 +5,16 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::board::Board;
 use super::factors::Factors;
-use super::field::{SIDE, TensorField};
+use super::schedule::memory::SharedValues;
+use super::schedule::values::Values;
 use super::stencil::UNREACHED;
 use super::stencil::foot;
 use super::stencil::ring::{RING, TRIANGLES, ring_of, rings, without_cut_corners};
+use super::tensor_field::TensorField;
 use super::tile::coefficients::{Coefficients, LaneLimits, factoring_terms, line_tensors};
 use super::tile::{Block, Tile};
-use super::tiles::Values;
+use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{lanes, least};
 use crate::linalg::simd::{self, Kernel};
 
@@ -41,15 +42,15 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 /// where not reached. With a factor taken out both may be higher; the nearer one still leads to the start.
 pub(super) fn predecessors(field: &TensorField, factors: &Factors, values: Values) -> Vec<u8> {
     let tiling = field.tiling;
-    let board = Board::new(values, f32::INFINITY);
+    let values = SharedValues::new(values, f32::INFINITY);
     let mut predecessors = vec![NOWHERE; tiling.cols * tiling.rows];
     let bands = predecessors.par_chunks_mut((tiling.cols * SIDE).max(1)).enumerate();
     bands.for_each_init(Block::default, |block, (y, band)| {
         for x in 0..tiling.across {
             let index = y * tiling.across + x;
             let factor = factors.of_tile(index).map(|factor| (factor, tiling.first(index)));
-            let tile = Tile { tensors: &field.tiles[index], factor, tolerance: 0.0, seeds: None };
-            board.load(index, block);
+            let tile = Tile { tensors: field.tensors(index), factor, tolerance: 0.0, seeds: None };
+            values.read(index, block);
             let [cols, _] = tiling.size(index);
             let found = simd::dispatch(OfTile { block, tile: &tile });
             for (line, found) in band.chunks_mut(tiling.cols).zip(found) {

@@ -3,13 +3,13 @@
 use glam::DVec2;
 
 use super::factors::Factors;
-use super::field::TensorField;
 use super::predecessor::best_foot;
+use super::schedule::values::Values;
 use super::source::StartRegion;
 use super::stencil::ring::RING;
+use super::tensor_field::TensorField;
 use super::tile::Limits;
 use super::tile::coefficients::ceiling;
-use super::tiles::Values;
 use super::{DistanceMap, Statistics, source};
 use crate::control::Control;
 use crate::error::{Error, Result};
@@ -49,7 +49,8 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
         }
         sweep += 1;
         if sweep > MOST_SWEEPS {
-            return Err(Error::usage("the distance does not settle on this metric"));
+            let activations = sweep * field.tiling.tiles();
+            return Err(Error::NotConverged { activations, at: None });
         }
     }
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
@@ -64,8 +65,6 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
         correction: None,
         starts: starts.into(),
         statistics,
-        unit: "",
-        frame: None,
     })
 }
 

@@ -4,11 +4,12 @@ use std::array::from_fn;
 
 use glam::DVec2;
 
-use super::field::{AREA, TensorField, Tiling};
 use super::stencil::UNREACHED;
 use super::stencil::factoring::Factor;
 use super::stencil::segment::segment;
+use super::tensor_field::TensorField;
 use crate::error::{Error, Result};
+use crate::grid::tiling::{AREA, Tiling};
 use crate::linalg::Sym2;
 
 /// Values that a tile's nodes have from the start, infinite where none.
@@ -237,7 +238,7 @@ impl StartRegion {
     fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
         let far = DVec2::INFINITY;
         let (least, most) = self.vertices().fold((far, -far), |(a, b), p| (a.min(p), b.max(p)));
-        let turns = field.tiling.turns(at, least - radius, most + radius);
+        let turns = field.tiling.images(at, least - radius, most + radius);
         let feet = turns.filter_map(|turn| {
             let (foot, length) = self.own_foot(field, at + turn, radius)?;
             Some((foot - turn, length))

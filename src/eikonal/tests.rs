@@ -4,13 +4,16 @@ mod periodic;
 
 use std::f64::consts::TAU;
 
+use glam::DVec2;
 use proptest::prelude::*;
 use rayon::prelude::*;
 
 use super::*;
+use crate::control::Control;
+use crate::error::Error;
 use crate::linalg::Sym2;
 
-mod edit;
+mod incremental;
 
 const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
 

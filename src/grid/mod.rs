@@ -2,6 +2,7 @@
 
 mod frame;
 mod isolines;
+pub(crate) mod tiling;
 
 pub use self::frame::{GridFrame, Ground};
 pub use self::isolines::{Isoline, isolines, levels_by_step, round_step};

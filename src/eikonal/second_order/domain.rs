@@ -2,14 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::super::field::{AREA, SIDE, Tiling};
-use super::super::sides::neighbours;
 use super::super::stencil::UNREACHED;
 use super::feet::{Feet, Input, Surroundings};
 use super::first_order::FirstOrder;
 use super::halo::STRIP;
 use crate::control::Control;
 use crate::error::Result;
+use crate::grid::tiling::{AREA, SIDE, Tiling};
 use crate::linalg::lanes::least;
 
 /// Tiles, in strips of [`STRIP`] side by side, with their feet. Grows where the correction is carried beyond.
@@ -61,7 +60,7 @@ impl<'a> Domain<'a> {
 
     fn add_around(&mut self, tile: usize) {
         self.add(tile);
-        neighbours(&self.solution.field.tiling, tile).for_each(|(_, n)| self.add(n));
+        self.solution.field.tiling.neighbours(tile).for_each(|(_, n)| self.add(n));
     }
 
     /// Adds the strip that a tile lies in.

@@ -6,12 +6,12 @@ use super::first_order::FirstOrder;
 use super::functional::{ConeAt, Foot};
 use super::halo::{MARGIN, Strip, WIDE, fill, rings_of, seen};
 use super::triangle::LaneTriangle;
-use crate::eikonal::field::{AREA, SIDE};
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::{RING, ring_of};
 use crate::eikonal::tile::Tile;
 use crate::eikonal::tile::coefficients::{LaneLimits, factoring_terms, line_tensors};
 use crate::eikonal::tile::transpose::transpose;
+use crate::grid::tiling::{AREA, SIDE};
 use crate::linalg::lanes::{Lanes, choose_bits as choose, lanes};
 use crate::linalg::simd::{self, Kernel};
 
@@ -85,9 +85,9 @@ impl Surroundings {
             None => self.e.as_flattened_mut().fill(0.0),
         }
         let [xx, xy, det, _] = &mut self.metric;
-        fill(xx, tiling, part, 0.0, |t| &field.tiles[t].xx);
-        fill(xy, tiling, part, 0.0, |t| &field.tiles[t].xy);
-        fill(det, tiling, part, 0.0, |t| &field.tiles[t].det);
+        fill(xx, tiling, part, 0.0, |t| &field.tensors(t).xx);
+        fill(xy, tiling, part, 0.0, |t| &field.tensors(t).xy);
+        fill(det, tiling, part, 0.0, |t| &field.tensors(t).det);
         simd::dispatch(Invert { metric: &mut self.metric });
         let again = input.total.is_some();
         for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {
@@ -95,7 +95,7 @@ impl Surroundings {
             let size = tiling.size(tile);
             let factor = factors.of_tile(tile).map(|factor| (factor, tiling.first(tile)));
             let seeds = seeds[tile].as_deref();
-            let tile = Tile { tensors: &field.tiles[tile], factor, tolerance: 0.0, seeds };
+            let tile = Tile { tensors: field.tensors(tile), factor, tolerance: 0.0, seeds };
             let around = &*self;
             *reads = match factor {
                 Some(_) => simd::dispatch(Find::<true> { around, from, tile, size, again, feet }),

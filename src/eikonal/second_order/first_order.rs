@@ -1,10 +1,11 @@
 //! The first-order solution that is corrected.
 
 use super::super::factors::Factors;
-use super::super::field::{AREA, TensorField};
+use super::super::schedule::values::Values;
 use super::super::source::Seeds;
 use super::super::stencil::UNREACHED;
-use super::super::tiles::Values;
+use super::super::tensor_field::TensorField;
+use crate::grid::tiling::AREA;
 
 /// The first-order solution that is to be corrected.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,7 @@
 //! Tiles side by side with the nodes around them.
 
-use super::super::field::{AREA, SIDE, Tiling};
-use super::super::sides::neighbour;
 use crate::eikonal::stencil::ring::rings;
+use crate::grid::tiling::{AREA, SIDE, Tiling};
 use crate::linalg::lanes::{Lanes, lanes};
 
 /// Nodes around the tiles that the functional looks at.
@@ -34,7 +33,7 @@ pub(super) fn fill<'a>(
     let rows = [(-1, SIDE - MARGIN..SIDE, 0), (0, 0..SIDE, MARGIN), (1, 0..MARGIN, MARGIN + SIDE)];
     for (dy, from, to) in rows {
         for k in 0..tiles + 2 {
-            let Some(tile) = neighbour(tiling, first, k as isize - 1, dy) else { continue };
+            let Some(tile) = tiling.neighbour(first, k as isize - 1, dy) else { continue };
             let lines = values(tile).as_chunks::<SIDE>().0[from.clone()].iter();
             let lines = lines.zip(&mut strip[to..]);
             if k == 0 {

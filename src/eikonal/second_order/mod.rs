@@ -33,10 +33,10 @@ use rayon::prelude::*;
 use self::domain::Domain;
 pub(super) use self::first_order::FirstOrder;
 use self::transport::carry;
-use super::field::AREA;
 use super::tile::changes::ROUNDING;
 use crate::control::Control;
 use crate::error::Result;
+use crate::grid::tiling::AREA;
 use crate::linalg::lanes::greatest;
 
 /// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first

@@ -2,19 +2,19 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use super::super::board::Board;
-use super::super::crew;
-use super::super::field::{AREA, SIDE, Tiling};
-use super::super::queue::{Job, Queue};
-use super::super::sides::{ITSELF, neighbours, opposite};
+use super::super::schedule::active_set::{ActiveSet, ITSELF, Job};
+use super::super::schedule::memory::SharedValues;
+use super::super::schedule::rounds::WINDOW_CELLS;
+use super::super::schedule::values::Values;
+use super::super::schedule::worker_pool;
 use super::super::tile::transpose::transpose_block;
 use super::super::tile::{ALL, Block, LineMask};
-use super::super::tiles::{Values, WINDOW_CELLS};
 use super::domain::Domain;
 use super::feet::{self, BEFORE, BEHIND, Feet, Line};
 use super::triangle::LaneTriangle;
 use crate::control::Control;
 use crate::error::Result;
+use crate::grid::tiling::{AREA, SIDE, Tiling, opposite};
 use crate::linalg::lanes::{choose, lanes};
 use crate::linalg::simd::{self, Kernel};
 
@@ -57,8 +57,8 @@ pub(super) fn carry(
     let mut beyond = Vec::new();
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
-    let e = Board::new(Values { tiling, tiles: e }, 0.0);
-    let mut queue = Queue::new(tiles);
+    let e = SharedValues::new(Values { tiling, tiles: e }, 0.0);
+    let mut active = ActiveSet::new(tiles);
     let work = |_: &mut (), job: u64| {
         let tile = Job::from_bits(job).tile as usize;
         let outcome = match domain.feet(tile) {
@@ -73,47 +73,53 @@ pub(super) fn carry(
             let tile = Job::from_bits(job).tile as usize;
             let outcome = Outcome::from_bits(outcome);
             activations[tile] += 1;
-            let mut wake = |tile: usize| {
+            let mut activate = |tile: usize| {
                 if activations[tile] < MOST_ACTIVATIONS {
-                    queue.wake(tile, keys[tile], ITSELF);
+                    active.activate(tile, keys[tile], ITSELF);
                 }
             };
             if !outcome.converged {
-                wake(tile);
+                activate(tile);
             }
-            for (side, n) in neighbours(&tiling, tile) {
+            for (side, n) in tiling.neighbours(tile) {
                 if outcome.changed & 1 << side == 0 {
                     continue;
                 }
                 match domain.feet(n) {
-                    Some((_, reads)) if reads & 1 << opposite(side) != 0 => wake(n),
+                    Some((_, reads)) if reads & 1 << opposite(side) != 0 => activate(n),
                     Some(_) => {}
                     None => beyond.push(n),
                 }
             }
         }
         let next = order.peek().map_or(f32::INFINITY, |&tile| keys[tile as usize]);
-        let limit = queue.least_key().min(next) + window;
+        let limit = active.least_key().min(next) + window;
         while let Some(tile) = order.next_if(|&tile| keys[tile as usize] <= limit) {
-            queue.wake(tile as usize, keys[tile as usize], ITSELF);
+            active.activate(tile as usize, keys[tile as usize], ITSELF);
         }
         if limit.is_finite() {
             round += 1;
-            queue.take(&tiling, limit, round, jobs);
+            active.take(&tiling, limit, round, jobs);
         }
         Ok(())
     };
-    crew::run(tiles, lead, work)?;
+    worker_pool::run(tiles, lead, work)?;
     Ok((e.into_values().tiles, beyond))
 }
 
 /// Carries the correction through a tile until it converges.
-fn carry_tile(tiling: &Tiling, feet: &Feet, e: &Board, tile: usize, tolerance: f32) -> Outcome {
+fn carry_tile(
+    tiling: &Tiling,
+    feet: &Feet,
+    e: &SharedValues,
+    tile: usize,
+    tolerance: f32,
+) -> Outcome {
     let mut block = [[0.0; SIDE + 2]; SIDE + 2];
-    e.load(tile, &mut block);
+    e.read(tile, &mut block);
     let converged = simd::dispatch(Carry { block: &mut block, feet, tolerance });
     let changed = changed_sides(tiling, e, tile, &block, tolerance);
-    e.store(tile, &block);
+    e.write(tile, &block);
     Outcome { converged, changed }
 }
 
@@ -148,8 +154,14 @@ impl Kernel for Carry<'_> {
     }
 }
 
-/// The sides, as in [`Outcome`], on which the block differs from the board by more than `tolerance`.
-fn changed_sides(tiling: &Tiling, e: &Board, tile: usize, block: &Block, tolerance: f32) -> u8 {
+/// The sides, as in [`Outcome`], on which the block differs from the values before by more than `tolerance`.
+fn changed_sides(
+    tiling: &Tiling,
+    e: &SharedValues,
+    tile: usize,
+    block: &Block,
+    tolerance: f32,
+) -> u8 {
     let [cols, rows] = tiling.size(tile);
     let (east, south) = (cols - 1, rows - 1);
     let changed = |col: usize, row: usize| {

@@ -5,9 +5,9 @@
 use std::array::from_fn;
 
 use super::{ALL, Block, LineMask};
-use crate::eikonal::field::SIDE;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::RING;
+use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{choose, lanes, least};
 
 /// Four units in the last place of an `f32`: changes below are rounding.

@@ -5,10 +5,10 @@
 use glam::{DVec2, Vec2Swizzles as _};
 
 use super::{Limits, Tile};
-use crate::eikonal::field::SIDE;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::{TRIANGLES, Triangle};
 use crate::eikonal::stencil::segment::ClosedForm;
+use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
 
 /// What the update needs of `D` at the [`SIDE`] nodes of a line.

@@ -24,9 +24,9 @@ use super::changes::{ROUNDING, for_neighbours, lines_beside};
 use super::coefficients::{Coefficients, LaneLimits, factoring_terms, line_tensors};
 use super::transpose::transpose_block;
 use super::{ALL, BLOCK, Block, Limits, LineMask, Tile};
-use crate::eikonal::field::SIDE;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::{RING, ring_of, rings, without_cut_corners};
+use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
 use crate::linalg::simd::{self, Kernel};
 

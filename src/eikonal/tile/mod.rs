@@ -10,9 +10,10 @@ pub(crate) mod transpose;
 
 use glam::DVec2;
 
-use super::field::{SIDE, TensorTile};
 use super::source::Seeds;
 use super::stencil::factoring::Factor;
+use super::tensor_field::TensorTile;
+use crate::grid::tiling::SIDE;
 
 /// Side of a block: a tile and one node of each neighbour around it, its halo.
 pub(crate) const BLOCK: usize = SIDE + 2;

@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec4};
 
 use super::{BLOCK, Block};
-use crate::eikonal::field::SIDE;
+use crate::grid::tiling::SIDE;
 
 /// Side of the squares that are transposed in registers: number by number takes three times as long.
 const SQUARE: usize = 4;

@@ -1,16 +1,18 @@
-//! The tiles that wait to be solved.
+//! The active set: the tiles that wait to be solved.
 
-use super::field::Tiling;
-use super::sides::neighbours;
+use crate::grid::tiling::Tiling;
 
 /// One in so many of the waiting tiles may be taken at once, however far apart their keys are. At ratio 400, where
 /// keys lie far apart, a round would else have 9 tiles of the 220 that wait: two threads took 34 ms, with a sixth of them 32,
 /// one thread 50 and 51; with a fourth 53, and random speeds took 4 % longer.
 const SHARE: usize = 6;
 
+/// The side of changes in the tile itself, after those of its neighbours.
+pub(crate) const ITSELF: usize = 8;
+
 /// Tiles with keys, of which the least are taken.
 #[derive(Debug)]
-pub(super) struct Queue {
+pub(crate) struct ActiveSet {
     /// The tiles that wait, in any order, and for each the least value that may still change it. Side by side, since
     /// all keys are looked at in every round.
     tiles: Vec<u32>,
@@ -25,28 +27,29 @@ struct Entry {
     place: u32,
     /// Number of the round that last took the tile or one of its neighbours.
     taken: u32,
-    /// The sides that have news, one bit each in the order of [`SIDES`](super::sides::SIDES), and the one that has the least.
-    sides: u16,
+    /// Where there are changes that it has not seen, one bit for each side as in [`Tiling::neighbours`] and one for the tile
+    /// [`ITSELF`], and the side with the least.
+    changed: u16,
     first: u8,
 }
 
 impl Entry {
     /// The place of a tile that does not wait.
     const NOWHERE: u32 = u32::MAX;
-    const NEW: Self = Self { place: Self::NOWHERE, taken: 0, sides: 0, first: 0 };
+    const NEW: Self = Self { place: Self::NOWHERE, taken: 0, changed: 0, first: 0 };
 }
 
-impl Queue {
-    pub(super) fn new(tiles: usize) -> Self {
+impl ActiveSet {
+    pub(crate) fn new(tiles: usize) -> Self {
         Self { tiles: Vec::new(), keys: Vec::new(), entries: vec![Entry::NEW; tiles] }
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.tiles.is_empty()
     }
 
-    /// Forgets all, where only the given tiles and those that wait were taken, woken or lie beside one that was.
-    pub(super) fn clear(&mut self, tiles: &[usize]) {
+    /// Forgets all, where only the given tiles and those that wait were activated, taken or lie beside one that was.
+    pub(crate) fn clear(&mut self, tiles: &[usize]) {
         for tile in self.tiles.drain(..) {
             self.entries[tile as usize] = Entry::NEW;
         }
@@ -54,15 +57,15 @@ impl Queue {
         tiles.iter().for_each(|&tile| self.entries[tile] = Entry::NEW);
     }
 
-    /// News of value `key` from the neighbour `side`.
-    pub(super) fn wake(&mut self, tile: usize, key: f32, side: usize) {
+    /// Lets a tile wait because values of at least `key` changed at a side of it.
+    pub(crate) fn activate(&mut self, tile: usize, key: f32, side: usize) {
         let entry = &mut self.entries[tile];
         if entry.place == Entry::NOWHERE {
-            (entry.place, entry.sides) = (self.tiles.len() as u32, 0);
+            (entry.place, entry.changed) = (self.tiles.len() as u32, 0);
             self.tiles.push(tile as u32);
             self.keys.push(f32::INFINITY);
         }
-        entry.sides |= 1 << side;
+        entry.changed |= 1 << side;
         let least = &mut self.keys[entry.place as usize];
         if key < *least {
             *least = key;
@@ -70,7 +73,7 @@ impl Queue {
         }
     }
 
-    pub(super) fn least_key(&self) -> f32 {
+    pub(crate) fn least_key(&self) -> f32 {
         // Keys are not negative, so that their bits are in order; the minimum of integers is taken many at a time.
         let infinity = f32::INFINITY.to_bits();
         f32::from_bits(self.keys.iter().map(|key| key.to_bits()).fold(infinity, u32::min))
@@ -78,7 +81,7 @@ impl Queue {
 
     /// Up to which key tiles are to be taken next: `window` above the least, or farther where fewer than one in [`SHARE`]
     /// of those that wait lie within that.
-    pub(super) fn horizon(&self, window: f32) -> f32 {
+    pub(crate) fn horizon(&self, window: f32) -> f32 {
         let limit = self.least_key() + window;
         let least = self.keys.len() / SHARE;
         let within = self.keys.iter().filter(|&&key| key <= limit).count();
@@ -90,20 +93,20 @@ impl Queue {
 
     /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first, and gives them, as the bits of
     /// [`Job`]s, in order of place.
-    pub(super) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u64>) {
+    pub(crate) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u64>) {
         let waiting = self.keys.iter().zip(&self.tiles).filter(|&(&key, _)| key <= limit);
         let ranked = waiting.map(|(key, &tile)| u64::from(key.to_bits()) << 32 | u64::from(tile));
         let mut candidates: Vec<u64> = ranked.collect();
         candidates.sort_unstable();
         for candidate in candidates {
             let tile = candidate as u32;
-            let Entry { taken: last, sides, first, .. } = self.entries[tile as usize];
+            let Entry { taken: last, changed, first, .. } = self.entries[tile as usize];
             if last == round {
                 continue;
             }
-            taken.push(Job { tile, sides, first }.to_bits());
+            taken.push(Job { tile, changed, first }.to_bits());
             self.remove(tile as usize);
-            for (_, n) in neighbours(tiling, tile as usize) {
+            for (_, n) in tiling.neighbours(tile as usize) {
                 self.entries[n].taken = round;
             }
         }
@@ -122,20 +125,20 @@ impl Queue {
 
 /// A tile to be solved.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Job {
-    pub(super) tile: u32,
-    /// The sides that have news, and the one with the least, see [`Entry`].
-    pub(super) sides: u16,
-    pub(super) first: u8,
+pub(crate) struct Job {
+    pub(crate) tile: u32,
+    /// Where there are changes, and the side with the least, as [`Problem::changed`](crate::eikonal::tile::kernel::Problem) has them.
+    pub(crate) changed: u16,
+    pub(crate) first: u8,
 }
 
 impl Job {
     /// The tile in the upper half, so that bits are in its order.
-    pub(super) fn to_bits(self) -> u64 {
-        u64::from(self.tile) << 32 | u64::from(self.sides) << 16 | u64::from(self.first)
+    pub(crate) fn to_bits(self) -> u64 {
+        u64::from(self.tile) << 32 | u64::from(self.changed) << 16 | u64::from(self.first)
     }
 
-    pub(super) fn from_bits(bits: u64) -> Self {
-        Self { tile: (bits >> 32) as u32, sides: (bits >> 16) as u16, first: bits as u8 }
+    pub(crate) fn from_bits(bits: u64) -> Self {
+        Self { tile: (bits >> 32) as u32, changed: (bits >> 16) as u16, first: bits as u8 }
     }
 }

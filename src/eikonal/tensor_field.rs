@@ -7,20 +7,15 @@ use rayon::prelude::*;
 
 use crate::control::Control;
 use crate::error::{Error, Result};
+use crate::grid::GridFrame;
+use crate::grid::tiling::{AREA, SIDE, Tiling};
 use crate::linalg::Sym2;
-use crate::linalg::bilinear::{CORNERS, corner_weights};
-use crate::linalg::lanes::LANES;
 use crate::linalg::simd::{self, Kernel};
 use crate::metric::MetricField;
 use crate::metric::SpeedBlock;
 use crate::surface::BLOCK;
 
-/// Side of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
-/// needs more activations, the longer more sweeps; design measurements at ratio 1 to 400).
-pub(crate) const SIDE: usize = LANES;
 const _: () = assert!(SIDE == BLOCK, "a tile is filled from one block of speeds");
-/// Nodes of a tile.
-pub(crate) const AREA: usize = SIDE * SIDE;
 
 /// `D` of a tile's nodes, row by row: `xx`, `xy` and the determinant, which is 0 where the node is closed.
 #[derive(Clone, Debug)]
@@ -34,163 +29,6 @@ impl TensorTile {
     const CLOSED: Self = Self { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
 }
 
-/// How the nodes of a grid are cut into tiles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Tiling {
-    pub(crate) cols: usize,
-    pub(crate) rows: usize,
-    pub(crate) across: usize,
-    pub(crate) down: usize,
-    /// Whether the first column comes again after the last, and the first row.
-    pub(crate) periodic: [bool; 2],
-}
-
-/// Coordinates in a periodic direction are less than this: beyond, an `f64` would not tell the points of a cell apart.
-const FAR: f64 = 1e12;
-
-impl Tiling {
-    pub(crate) fn new(cols: usize, rows: usize) -> Self {
-        let (across, down) = (cols.div_ceil(SIDE), rows.div_ceil(SIDE));
-        Self { cols, rows, across, down, periodic: [false; 2] }
-    }
-
-    pub(crate) fn tiles(&self) -> usize {
-        self.across * self.down
-    }
-
-    /// Whether a tile is its own neighbour along x and along y.
-    pub(crate) fn is_ring(&self) -> [bool; 2] {
-        let [across, down] = self.periodic;
-        [across && self.across == 1, down && self.down == 1]
-    }
-
-    /// The first node of a tile.
-    pub(crate) fn first(&self, tile: usize) -> DVec2 {
-        DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64
-    }
-
-    /// The tiles that touch the square `radius` around a point, and perhaps some beside them.
-    pub(super) fn tiles_around(&self, at: DVec2, radius: f64) -> impl Iterator<Item = usize> {
-        let span = |at: f64, count: usize| {
-            let [from, to] =
-                [at - radius - 1.0, at + radius + 1.0].map(|x| (x / SIDE as f64).floor());
-            // An `as` clamps to what is there.
-            from as usize..count.min((to + 1.0) as usize)
-        };
-        let (across, columns) = (self.across, span(at.x, self.across));
-        span(at.y, self.down).flat_map(move |y| columns.clone().map(move |x| y * across + x))
-    }
-
-    /// Columns and rows of a tile.
-    pub(crate) fn size(&self, tile: usize) -> [usize; 2] {
-        let (x, y) = (tile % self.across, tile / self.across);
-        [SIDE.min(self.cols - x * SIDE), SIDE.min(self.rows - y * SIDE)]
-    }
-
-    /// Tile and place in it of a node.
-    pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
-        ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)
-    }
-
-    /// The node that is found at a column and a row, counted on around the grid where it is periodic; `None` outside.
-    pub(crate) fn node(&self, col: isize, row: isize) -> Option<(usize, usize)> {
-        let [across, down] = self.periodic;
-        Some((wrap(col, self.cols, across)?, wrap(row, self.rows, down)?))
-    }
-
-    /// Whether the nodes within `margin` of `count` tiles side by side lie over the seam of a periodic direction.
-    pub(crate) fn is_over_seam(&self, tile: usize, count: usize, margin: usize) -> bool {
-        let over =
-            |at: usize, tiles: usize, count: usize| at == 0 || (at + tiles) * SIDE + margin > count;
-        let [across, down] = self.periodic;
-        across && over(tile % self.across, count, self.cols)
-            || down && over(tile / self.across, 1, self.rows)
-    }
-
-    /// Tile and place in it of the node at a column and a row counted from the first of a tile; `None` outside.
-    ///
-    /// The last tile of a periodic direction may be wider than what is left of the grid. The places beyond are closed
-    /// and never updated, but seen from the tile they are the first nodes of the next turn, for their neighbours to
-    /// read.
-    pub(crate) fn seen_from(&self, tile: usize, col: isize, row: isize) -> Option<(usize, usize)> {
-        let (x, y) = (tile % self.across, tile / self.across);
-        let (col, row) = self.node((x * SIDE) as isize + col, (y * SIDE) as isize + row)?;
-        Some(self.place(col, row))
-    }
-
-    /// Least and greatest coordinates of points on the grid.
-    pub(crate) fn bounds(&self) -> (DVec2, DVec2) {
-        let [across, down] = self.periodic;
-        let least = DVec2::new(if across { -FAR } else { 0.0 }, if down { -FAR } else { 0.0 });
-        let last = DVec2::new(self.cols as f64, self.rows as f64) - 1.0;
-        (least, DVec2::select(least.cmplt(DVec2::ZERO), -least, last))
-    }
-
-    pub(crate) fn contains(&self, at: DVec2) -> bool {
-        let (least, most) = self.bounds();
-        at.cmpge(least).all() && at.cmple(most).all()
-    }
-
-    /// Columns (`axis` 0) or rows (1) of the grid between two coordinates.
-    pub(crate) fn span(&self, axis: usize, from: f64, to: f64) -> Range<isize> {
-        let (least, most) = self.bounds();
-        from.max(least[axis]).ceil() as isize..to.min(most[axis]).floor() as isize + 1
-    }
-
-    /// A metric at a point from those of the nodes, where these have one: bilinear over the corners of the cell.
-    pub(super) fn bilinear(
-        &self,
-        at: DVec2,
-        metric: impl Fn(isize, isize) -> Option<Sym2>,
-    ) -> Option<Sym2> {
-        let corner = |axis: usize, count: usize| {
-            let corner = at[axis].floor() as isize;
-            let last = count.saturating_sub(2) as isize;
-            if self.periodic[axis] { corner } else { corner.clamp(0, last) }
-        };
-        let (col, row) = (corner(0, self.cols), corner(1, self.rows));
-        let inside = at - DVec2::new(col as f64, row as f64);
-        let mut sum = Sym2::default();
-        let mut weight = 0.0;
-        for ((i, j), w) in CORNERS.into_iter().zip(corner_weights(inside)) {
-            if let Some(metric) = metric(col + i, row + j) {
-                // A trace of weight for every open corner, so that a point on a closed one has a metric too.
-                let w = w + 1e-9;
-                sum = sum + metric * w;
-                weight += w;
-            }
-        }
-        (weight > 0.0).then(|| sum * (1.0 / weight))
-    }
-
-    /// What to add to a point to come to its images between `least` and `most`; in a direction that is not periodic there is
-    /// only the point itself.
-    pub(crate) fn turns(
-        &self,
-        at: DVec2,
-        least: DVec2,
-        most: DVec2,
-    ) -> impl Iterator<Item = DVec2> + use<> {
-        let period = DVec2::new(self.cols as f64, self.rows as f64);
-        let (first, last) = ((least - at) / period, (most - at) / period);
-        let periodic = self.periodic;
-        let along = move |axis: usize| match periodic[axis] {
-            true => first[axis].ceil() as isize..=last[axis].floor() as isize,
-            false => 0..=0,
-        };
-        let turn = move |i: isize, j: isize| DVec2::new(i as f64, j as f64) * period;
-        along(1).flat_map(move |j| along(0).map(move |i| turn(i, j)))
-    }
-}
-
-/// The place of `at` among `count`, counted on around them if they are periodic.
-pub(super) fn wrap(at: isize, count: usize, periodic: bool) -> Option<usize> {
-    match usize::try_from(at) {
-        Ok(at) if at < count => Some(at),
-        _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
-    }
-}
-
 /// The speed tensors of a grid in index coordinates (column, row; spacing 1), divided by a power of four
 /// so that typical entries are near 1 and `f32` never overflows, whatever the unit of the terrain.
 ///
@@ -198,11 +36,14 @@ pub(super) fn wrap(at: isize, count: usize, periodic: bool) -> Option<usize> {
 #[derive(Clone, Debug)]
 pub struct TensorField {
     pub(crate) tiling: Tiling,
-    pub(super) tiles: Vec<TensorTile>,
+    tiles: Vec<TensorTile>,
     /// `D = scale · stored`, so distance is stored distance divided by [`root_scale`](Self::root_scale).
     root_scale: f64,
     /// Mean over the open nodes of the length of a cell, `det(D)^(−1/4)`, in stored units.
     pub(super) mean_step: f32,
+    /// Unit of the distance, and where the nodes lie on the ground, if that is known.
+    unit: &'static str,
+    frame: Option<GridFrame>,
 }
 
 impl TensorField {
@@ -223,7 +64,8 @@ impl TensorField {
                 *det = if by.x < widest { *det } else { Default::default() };
             }
         };
-        Self::build(frame.cols(), frame.rows(), &stretch, sample, control)
+        let field = Self::build(frame.cols(), frame.rows(), &stretch, sample, control)?;
+        Ok(Self { unit: metric.unit(), frame: Some(frame.clone()), ..field })
     }
 
     /// The field of a function of `(column, row)` in index coordinates; `None`, or a tensor that is not positive definite, for a
@@ -285,7 +127,8 @@ impl TensorField {
         let tiling = Tiling { periodic, ..Tiling::new(cols, rows) };
         let row = |y: usize| &self.tiles[y * self.tiling.across..][across.clone()];
         let tiles = down.clone().flat_map(row).cloned().collect();
-        (Self { tiling, tiles, ..*self }, [across.start * SIDE, down.start * SIDE])
+        let first = [across.start * SIDE, down.start * SIDE];
+        (Self { tiling, tiles, frame: None, ..*self }, first)
     }
 
     /// Closes the nodes that `is_open` says no to, given column and row.
@@ -344,7 +187,19 @@ impl TensorField {
             (sum + f64::from(cells.lengths), count + cells.count as usize)
         });
         let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
-        Ok(Self { tiling, tiles, root_scale, mean_step: mean_step as f32 })
+        let mean_step = mean_step as f32;
+        Ok(Self { tiling, tiles, root_scale, mean_step, unit: "", frame: None })
+    }
+
+    /// Unit of the distance; empty if it is not known.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        self.unit
+    }
+
+    /// Size of a cell in a row: in metres on the ground if that is known, else 1.
+    pub(super) fn spacing(&self, row: f64) -> DVec2 {
+        self.frame.as_ref().map_or(DVec2::ONE, |frame| frame.spacing(row))
     }
 
     /// Columns of the grid.
@@ -388,6 +243,11 @@ impl TensorField {
     pub fn is_open(&self, col: usize, row: usize) -> bool {
         let (tile, place) = self.tiling.place(col, row);
         self.tiles[tile].det[place] > 0.0
+    }
+
+    /// The tensors of a tile.
+    pub(crate) fn tensors(&self, tile: usize) -> &TensorTile {
+        &self.tiles[tile]
     }
 
     /// Square root of the scale that was divided out of the tensors.
@@ -535,7 +395,7 @@ mod tests {
                 let by = frame.spacing(row as f64) * DVec2::new(1.0, -1.0) * field.root_scale();
                 let d = metric.speed(DVec2::new(col as f64, row as f64)).stretched(by.recip());
                 let (tile, i) = field.tiling.place(col, row);
-                let tile = &field.tiles[tile];
+                let tile = field.tensors(tile);
                 let [xx, xy, det] = [tile.xx[i], tile.xy[i], tile.det[i]].map(f64::from);
                 largest = largest
                     .max((xx - d.xx).abs() / d.xx)

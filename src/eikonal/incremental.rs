@@ -1,21 +1,26 @@
 //! Solving again after an edit of the field, only as far as the edit is felt.
 //!
 //! A node's value is still true if it is *supported*: if the update from its ring gives no more. So the nodes that
-//! changed are forgotten, then all that are no longer supported, in the order in which news travel, until none is left
+//! changed are forgotten, then all that are no longer supported, in the order in which changes travel, until none is left
 //! ([`Rule::Forget`](super::tile::kernel::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
 //! step than anything its ring offers. What is left is true or too high, so that the ordinary solve, going on from
 //! the nodes that were forgotten, ends where one from the beginning would.
 
 use rayon::prelude::*;
 
-use super::field::{AREA, TensorTile};
-use super::sides::neighbours;
+use super::distance_map::DistanceMap;
+use super::factors::Factors;
+use super::schedule::rounds::{Equation, Statistics};
+use super::schedule::solution::{self, Changes, Solution};
+use super::schedule::stop::Stop;
+use super::schedule::values::Values;
+use super::solver::Solver;
 use super::source::{self, Seeds};
 use super::stencil::UNREACHED;
-use super::tiles::{self, Equation, News, Solution, Statistics, Values};
-use super::{DistanceMap, Factors, Solver, Stop, TensorField};
+use super::tensor_field::TensorField;
 use crate::control::Control;
 use crate::error::Result;
+use crate::grid::tiling::AREA;
 use crate::linalg::Sym2;
 use crate::metric::MetricField;
 
@@ -36,10 +41,7 @@ impl Solver {
         stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
-        let field = TensorField::sample(metric, control)?;
-        let map = self.update_field(map, field, stop, control)?;
-        let frame = Some(metric.surface().frame().clone());
-        Ok(DistanceMap { unit: metric.unit(), frame, ..map })
+        self.update_field(map, TensorField::sample(metric, control)?, stop, control)
     }
 
     /// [`update`](Self::update) for tensors of any origin, in index coordinates.
@@ -111,11 +113,11 @@ impl Solver {
             seeds: &seeds,
             tolerance: self.tolerance,
         };
-        let news = News::Lost(&lost);
-        let left = tiles::solve(&equation, map.values, map.limits, news, &Stop::Never, control)?;
-        let Solution { values, limits, statistics: forgetting } = left.expect(
-            "settles: a tile is looked at again only where a node of it or around it was forgotten",
-        );
+        // This converges: a tile is looked at again only where a node of it or around it was forgotten.
+        let changes = Changes::Lost(&lost);
+        let left =
+            solution::solve(&equation, map.values, map.limits, changes, &Stop::Never, control)?;
+        let Solution { values, limits, statistics: forgetting } = left;
         let map = DistanceMap { values, limits, ..map };
         let is_touched = |&(tile, reached): &(usize, usize)| {
             lost[tile] < f32::INFINITY || count_reached(&map.values, tile) != reached
@@ -139,15 +141,16 @@ impl Solver {
 
 /// Tile and place in it of the nodes whose tensors differ.
 fn differences(old: &TensorField, new: &TensorField) -> Vec<(usize, usize)> {
-    let differ = |(tile, (old, new)): (usize, (&TensorTile, &TensorTile))| {
+    let differ = |tile: usize| {
+        let (old, new) = (old.tensors(tile), new.tensors(tile));
         let same = old.xx == new.xx && old.xy == new.xy && old.det == new.det;
-        let differs =
-            |&i: &usize| (old.xx[i], old.xy[i], old.det[i]) != (new.xx[i], new.xy[i], new.det[i]);
+        let differs = move |&i: &usize| {
+            (old.xx[i], old.xy[i], old.det[i]) != (new.xx[i], new.xy[i], new.det[i])
+        };
         let places = if same { 0..0 } else { 0..AREA };
-        places.filter(differs).map(move |place| (tile, place)).collect::<Vec<_>>()
+        places.filter(differs).map(move |place| (tile, place))
     };
-    let tiles = old.tiles.par_iter().zip(&new.tiles).enumerate().with_min_len(64);
-    tiles.flat_map_iter(differ).collect()
+    (0..old.tiling.tiles()).into_par_iter().with_min_len(64).flat_map_iter(differ).collect()
 }
 
 /// Tile and place in it of the nodes whose start value changed, came or went.
@@ -179,7 +182,7 @@ fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize
 
 /// A tile and its neighbours.
 fn around(values: &Values, tile: usize) -> impl Iterator<Item = usize> + '_ {
-    std::iter::once(tile).chain(neighbours(&values.tiling, tile).map(|(_, n)| n))
+    std::iter::once(tile).chain(values.tiling.neighbours(tile).map(|(_, n)| n))
 }
 
 fn count_reached(values: &Values, tile: usize) -> usize {
@@ -192,7 +195,7 @@ fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
     for &(tile, place) in nodes {
         let value = &mut map.values.tiles[tile][place];
         lost[tile] = lost[tile].min(value.min(UNREACHED));
-        let open = map.field.tiles[tile].det[place] > 0.0;
+        let open = map.field.tensors(tile).det[place] > 0.0;
         *value = if open { UNREACHED } else { f32::INFINITY };
     }
     lost

@@ -1,8 +1,10 @@
 //! Which start region each node belongs to.
 
+use super::distance_map::DistanceMap;
+use super::interpolation::SLACK;
 use super::predecessor::predecessors;
+use super::source;
 use super::stencil::ring::RING;
-use super::{DistanceMap, SLACK, source};
 
 /// Not looked at yet.
 const UNKNOWN: u32 = u32::MAX;
@@ -21,14 +23,14 @@ impl DistanceMap {
     pub fn labels(&self) -> Vec<Option<u32>> {
         let cols = self.cols();
         let mut labels = self.seed_labels();
-        let origins = predecessors(&self.field, &self.factors, self.corrected());
+        let predecessors = predecessors(&self.field, &self.factors, self.corrected());
         let mut way = Vec::new();
         for first in 0..labels.len() {
             let mut at = first;
             while labels[at] == UNKNOWN {
                 labels[at] = PENDING;
                 way.push(at);
-                match self.beside(at % cols, at / cols, origins[at]) {
+                match self.beside(at % cols, at / cols, predecessors[at]) {
                     Some((col, row)) => at = row * cols + col,
                     None => labels[at] = NONE,
                 }

@@ -1,0 +1,129 @@
+//! Distances at the nodes: what a solve comes to.
+
+use rayon::prelude::*;
+
+use super::factors::Factors;
+use super::schedule::rounds::Statistics;
+use super::schedule::values::Values;
+use super::second_order::Correction;
+use super::source::StartRegion;
+use super::stencil::UNREACHED;
+use super::tensor_field::{TensorField, TensorTile};
+use super::tile::Limits;
+use crate::grid::tiling::AREA;
+
+/// Distance from the nearest start region at every node.
+#[derive(Clone, Debug)]
+pub struct DistanceMap {
+    pub(crate) field: TensorField,
+    pub(super) factors: Factors,
+    /// First order.
+    pub(super) values: Values,
+    /// What is to be added to them, in high accuracy.
+    pub(super) correction: Option<Correction>,
+    /// What is known of each tile, for going on.
+    pub(super) limits: Vec<Limits>,
+    pub(super) starts: Box<[StartRegion]>,
+    pub(super) statistics: Statistics,
+}
+
+impl DistanceMap {
+    /// Columns of the grid.
+    #[must_use]
+    pub fn cols(&self) -> usize {
+        self.field.cols()
+    }
+
+    /// Rows of the grid.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.field.rows()
+    }
+
+    /// Unit of the values: `m` or `AG units`; empty for a bare tensor field.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        self.field.unit()
+    }
+
+    /// How much work the solve took.
+    #[must_use]
+    pub fn statistics(&self) -> Statistics {
+        self.statistics
+    }
+
+    /// Memory that the map takes per node: tensors, values and, in high accuracy, two rounds of corrections.
+    #[must_use]
+    pub fn bytes_per_node(&self) -> usize {
+        let numbers = if self.correction.is_some() { 3 } else { 1 };
+        size_of::<TensorTile>() / AREA + numbers * size_of::<f32>()
+    }
+
+    /// Distance at a node; infinite where not reached.
+    #[must_use]
+    pub fn at_node(&self, col: usize, row: usize) -> f64 {
+        let value = self.value(col, row);
+        if value < UNREACHED { f64::from(value) / self.field.root_scale() } else { f64::INFINITY }
+    }
+
+    /// Estimate of the error of the distance at a node; `None` where not reached and if the accuracy was not
+    /// [`Accuracy::High`].
+    #[must_use]
+    pub fn error_at_node(&self, col: usize, row: usize) -> Option<f64> {
+        let (tile, place) = self.field.tiling.place(col, row);
+        let error = self.correction.as_ref()?.error_left(tile, place, self.value(col, row));
+        self.is_reached(col, row).then_some(f64::from(error) / self.field.root_scale())
+    }
+
+    /// Distances at all nodes, row-major from the north-west, infinite where not reached.
+    #[must_use]
+    pub fn to_row_major(&self) -> Vec<f32> {
+        let nodes = (0..self.rows()).flat_map(|row| (0..self.cols()).map(move |col| (col, row)));
+        nodes.map(|(col, row)| self.at_node(col, row) as f32).collect()
+    }
+
+    /// The values, if they have a correction that must follow when they change.
+    pub(super) fn to_correct(&self) -> Option<Values> {
+        self.correction.is_some().then(|| self.values.clone())
+    }
+
+    /// Which tiles have other values than before; none, if there is nothing to correct.
+    pub(super) fn differing(&self, before: Option<Values>) -> Vec<bool> {
+        let Some(before) = before else { return vec![false; self.values.tiles.len()] };
+        let pairs = before.tiles.par_iter().zip(&self.values.tiles);
+        pairs.map(|(before, after)| before != after).collect()
+    }
+
+    /// Value at a node in the field's stored units, corrected.
+    pub(super) fn value(&self, col: usize, row: usize) -> f32 {
+        let (tile, place) = self.field.tiling.place(col, row);
+        let correction = self.correction.as_ref().map_or(0.0, |all| all.at(tile, place));
+        self.values.tiles[tile][place] + correction
+    }
+
+    /// Values at all nodes in the field's stored units, corrected.
+    pub(super) fn corrected(&self) -> Values {
+        let mut values = self.values.clone();
+        let Some(correction) = &self.correction else { return values };
+        for (tile, nodes) in values.tiles.iter_mut().enumerate() {
+            for (place, value) in nodes.iter_mut().enumerate() {
+                *value += correction.at(tile, place);
+            }
+        }
+        values
+    }
+
+    pub(crate) fn stored(&self, col: usize, row: usize) -> f64 {
+        f64::from(self.value(col, row))
+    }
+
+    pub(crate) fn is_reached(&self, col: usize, row: usize) -> bool {
+        self.values.get(col, row) < UNREACHED
+    }
+
+    /// Stored value at a node, counted on around the grid where it is periodic; `None` outside and where not reached.
+    pub(crate) fn reached(&self, col: isize, row: isize) -> Option<f64> {
+        let (col, row) = self.field.tiling.node(col, row)?;
+        self.is_reached(col, row).then(|| self.stored(col, row))
+    }
+}

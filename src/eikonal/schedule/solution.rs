@@ -1,0 +1,112 @@
+//! A solve in memory, from the values that are given to those of the solution.
+
+use super::active_set::{ActiveSet, ITSELF};
+use super::memory::{MemoryStore, SharedValues};
+use super::rounds::{End, Equation, Schedule, Statistics};
+use super::stop::{self, Stop};
+use super::values::Values;
+use crate::control::Control;
+use crate::eikonal::stencil::UNREACHED;
+use crate::eikonal::tile::kernel::Rule;
+use crate::eikonal::tile::{BLOCK, Limits};
+use crate::error::Result;
+use crate::grid::tiling::{SIDE, Tiling, opposite};
+
+/// Which of the values given to a solve are changes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Changes<'a> {
+    /// All of them: they are those of the start.
+    All,
+    /// Those of and beside the nodes that are unreached in `before`, and around the `edited` nodes; the others are final,
+    /// or will be lowered by these.
+    Since { before: &'a Values, edited: &'a [f32] },
+    /// That nodes were edited and lost their values: for each tile the least of these, infinite if none. What came from
+    /// them is to be forgotten as well, see [`Rule::Forget`].
+    Lost(&'a [f32]),
+}
+
+/// What a solve comes to.
+#[derive(Debug)]
+pub(crate) struct Solution {
+    pub(crate) values: Values,
+    /// What is known of each tile: what can improve it.
+    pub(crate) limits: Vec<Limits>,
+    pub(crate) statistics: Statistics,
+}
+
+/// Relaxes `values` to the solution of the discrete equation, starting from those that are `changes`, until `stop` allows to
+/// end. What is not final then is unreached. `limits` are those of the solution that the values are from.
+///
+/// # Errors
+/// [`Error::NotConverged`](crate::error::Error::NotConverged); cancelled.
+pub(crate) fn solve(
+    equation: &Equation<'_>,
+    values: Values,
+    limits: Vec<Limits>,
+    changes: Changes<'_>,
+    stop: &Stop,
+    control: &Control,
+) -> Result<Solution> {
+    let tiling = &equation.field.tiling;
+    let slack = limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
+    let mut schedule = Schedule::new(MemoryStore::new(values, limits), tiling.tiles(), slack);
+    match changes {
+        Changes::All => schedule.activate_start(tiling, equation.seeds),
+        Changes::Since { before, edited } => {
+            let Schedule { store, active, .. } = &mut schedule;
+            activate_front(tiling, before, &store.values, edited, active);
+            schedule.reached = before.reached();
+        }
+        Changes::Lost(keys) => activate_around(tiling, keys, &mut schedule.active),
+    }
+    let rule = if matches!(changes, Changes::Lost(_)) { Rule::Forget } else { Rule::Lower };
+    let End { least_change, statistics } =
+        schedule.run(equation, rule, stop, |_, _| (), control)?;
+    let (mut values, limits) = schedule.store.into_parts();
+    if *stop != Stop::Never {
+        stop::mask(&mut values, equation.field, &limits, least_change, stop);
+    }
+    Ok(Solution { values, limits, statistics })
+}
+
+/// Activates every tile whose key is finite, and its neighbours on the sides to it.
+fn activate_around(tiling: &Tiling, keys: &[f32], active: &mut ActiveSet) {
+    for (tile, &key) in keys.iter().enumerate().filter(|&(_, &key)| key < f32::INFINITY) {
+        active.activate(tile, key, ITSELF);
+        for (side, n) in tiling.neighbours(tile) {
+            active.activate(n, key, opposite(side));
+        }
+    }
+}
+
+/// Activates every tile with a node that was unreached before, and now has a value or is beside one. Also those around the
+/// `edited` nodes: a node that was opened opens a diagonal step between others, which need not change themselves.
+fn activate_front(
+    tiling: &Tiling,
+    before: &Values,
+    values: &SharedValues,
+    edited: &[f32],
+    active: &mut ActiveSet,
+) {
+    let is_edited = |tile: usize| edited.get(tile).is_some_and(|&key| key < f32::INFINITY);
+    let mut block = [[f32::INFINITY; BLOCK]; BLOCK];
+    for (tile, before) in before.tiles.iter().enumerate() {
+        let all = is_edited(tile) || tiling.neighbours(tile).any(|(_, n)| is_edited(n));
+        if !all && !before.contains(&UNREACHED) {
+            continue;
+        }
+        values.read(tile, &mut block);
+        let mut key = UNREACHED;
+        for (rows, before) in block.windows(3).zip(before.chunks_exact(SIDE)) {
+            let across: [f32; BLOCK] =
+                std::array::from_fn(|i| rows[0][i].min(rows[1][i]).min(rows[2][i]));
+            for (beside, &before) in across.windows(3).zip(before) {
+                let least = beside[0].min(beside[1]).min(beside[2]);
+                key = key.min(if all || before == UNREACHED { least } else { UNREACHED });
+            }
+        }
+        if key < UNREACHED {
+            active.activate(tile, key, ITSELF);
+        }
+    }
+}

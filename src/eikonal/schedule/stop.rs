@@ -1,0 +1,154 @@
+//! The stop criterion: when a solve may end before all is reached.
+
+use glam::DVec2;
+
+use super::tile_store::TileStore;
+use super::values::Values;
+use crate::eikonal::stencil::UNREACHED;
+use crate::eikonal::tensor_field::TensorField;
+use crate::eikonal::tile::Limits;
+use crate::error::{Error, Result};
+use crate::grid::tiling::AREA;
+
+/// When to stop. Whatever the rule, what a map reports is final: the same as without it, but for the tolerance. All else is
+/// unreached.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Stop {
+    /// Once all that can be reached is.
+    #[default]
+    Never,
+    /// Once the distances around all of these points (grid coordinates) are final. One that cannot be reached makes it `Never`.
+    AllGoals(Vec<DVec2>),
+    /// Once the distance around any of these points is.
+    AnyGoal(Vec<DVec2>),
+    /// Once all nodes up to this distance, in the unit of the metric, are final. Nodes farther away are unreached.
+    Distance(f64),
+    /// Once at least so many nodes are final.
+    Nodes(usize),
+}
+
+impl Stop {
+    /// # Errors
+    /// A distance that is no number or negative.
+    pub(crate) fn check(&self) -> Result<()> {
+        match *self {
+            Self::Distance(d) if d.is_nan() || d < 0.0 => {
+                Err(Error::argument("the distance to stop at", d, "0 or more"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The largest value to be reported, in stored units.
+    pub(crate) fn largest(&self, field: &TensorField) -> f32 {
+        match self {
+            Self::Distance(d) => (d * field.root_scale()).min(UNREACHED.into()) as f32,
+            _ => UNREACHED,
+        }
+    }
+}
+
+/// How far a solve has come.
+#[derive(Debug)]
+pub(crate) struct Progress<'a, S> {
+    pub(crate) field: &'a TensorField,
+    pub(crate) store: &'a S,
+    /// At most so many nodes have a value.
+    pub(crate) reached: usize,
+    /// The greatest slack of any tile.
+    pub(crate) slack: f32,
+    /// The least change that a tile has not seen: no value below that changes any more. Infinite when all is done.
+    pub(crate) least_change: f32,
+}
+
+impl<S: TileStore> Progress<'_, S> {
+    /// Whether the solve may end.
+    pub(crate) fn meets(&self, stop: &Stop) -> Result<bool> {
+        match stop {
+            Stop::Never => Ok(false),
+            Stop::AllGoals(goals) => self.meets_all(goals),
+            Stop::AnyGoal(goals) => self.meets_any(goals),
+            Stop::Distance(_) => Ok(self.least_change > self.last_change(stop)),
+            Stop::Nodes(count) => Ok(self.reached >= *count && self.final_nodes()? >= *count),
+        }
+    }
+
+    /// The greatest change that can bear on a value to be reported: a node not reached by then is farther, one reached
+    /// may still come down by its slack.
+    pub(crate) fn last_change(&self, stop: &Stop) -> f32 {
+        if !matches!(stop, Stop::Distance(_)) {
+            return UNREACHED;
+        }
+        stop.largest(self.field) + self.slack
+    }
+
+    fn meets_all(&self, goals: &[DVec2]) -> Result<bool> {
+        for &goal in goals {
+            if self.is_converged(goal)? == Some(false) {
+                return Ok(false);
+            }
+        }
+        Ok(!goals.is_empty())
+    }
+
+    fn meets_any(&self, goals: &[DVec2]) -> Result<bool> {
+        for &goal in goals {
+            if self.is_converged(goal)? == Some(true) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn final_nodes(&self) -> Result<usize> {
+        let mut count = 0;
+        for tile in 0..self.field.tiling.tiles() {
+            let limits = self.store.limits(tile)?;
+            for place in 0..AREA {
+                let value = self.store.value(tile, place)?;
+                count += usize::from(is_final(value, &limits, self.least_change));
+            }
+        }
+        Ok(count)
+    }
+
+    /// Whether the open corners of the goal's cell, and what their values come from, are final; `None` if there are none.
+    fn is_converged(&self, goal: DVec2) -> Result<Option<bool>> {
+        let field = self.field;
+        let (west, east) = (goal.x.floor() as isize, goal.x.ceil() as isize);
+        let (north, south) = (goal.y.floor() as isize, goal.y.ceil() as isize);
+        let corners = [(west, north), (east, north), (west, south), (east, south)];
+        let node = |(c, r)| field.tiling.node(c, r).filter(|&(c, r)| field.is_open(c, r));
+        let mut all = None;
+        for (col, row) in corners.into_iter().filter_map(node) {
+            let (tile, place) = field.tiling.place(col, row);
+            let last = self.store.value(tile, place)? + self.store.limits(tile)?.longest_step;
+            all = Some(all.unwrap_or(true) && last < self.least_change);
+        }
+        Ok(all)
+    }
+}
+
+/// Whether no change of this value and above will change a node: a neighbour improves it only if its value is below the
+/// node's and the slack.
+pub(crate) fn is_final(value: f32, limits: &Limits, least_change: f32) -> bool {
+    value < UNREACHED && value + limits.slack < least_change
+}
+
+/// Forgets all values that are not final while there are changes, or are not to be reported.
+pub(crate) fn mask(
+    values: &mut Values,
+    field: &TensorField,
+    limits: &[Limits],
+    least_change: f32,
+    stop: &Stop,
+) {
+    let largest = stop.largest(field);
+    for (tile, limits) in values.tiles.iter_mut().zip(limits) {
+        for value in tile.iter_mut().filter(|value| **value < UNREACHED) {
+            if *value > largest || !is_final(*value, limits, least_change) {
+                *value = UNREACHED;
+            }
+        }
+    }
+}

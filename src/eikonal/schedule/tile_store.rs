@@ -1,0 +1,35 @@
+//! Where the values of a solve are kept while it runs.
+
+use crate::eikonal::tile::{Block, Limits};
+use crate::error::Result;
+
+/// Values at the nodes, and what is known of each tile, by the number of the tile.
+///
+/// Who solves a tile reads it and what is around it and writes nothing but the tile. Those of a round do not touch, so nobody reads what
+/// another writes; what is written in a round must be read in the next.
+pub(crate) trait TileStore: Sync {
+    /// The values of a tile and of the nodes around it; infinite outside the grid.
+    fn read(&self, tile: usize, block: &mut Block) -> Result<()>;
+
+    /// Puts the values of a tile back; of what lies around it nothing is taken, and what lies beyond the grid stays infinite.
+    fn write(&self, tile: usize, block: &Block) -> Result<()>;
+
+    /// The value at a place of a tile.
+    fn value(&self, tile: usize, place: usize) -> Result<f32>;
+
+    /// What is known of a tile; the default if it was never set.
+    fn limits(&self, tile: usize) -> Result<Limits>;
+
+    /// Puts down what is known of a tile.
+    fn set_limits(&self, tile: usize, limits: &Limits) -> Result<()>;
+
+    /// What a solve of the tile found: limits only grow.
+    fn raise_limits(&self, tile: usize, found: &Limits) -> Result<()> {
+        let known = self.limits(tile)?;
+        let limits = Limits {
+            slack: known.slack.max(found.slack),
+            longest_step: known.longest_step.max(found.longest_step),
+        };
+        self.set_limits(tile, &limits)
+    }
+}
