@@ -92,7 +92,7 @@ impl GridFrame {
     /// `step = (x per column, y per row towards the south)`, both positive, in map units.
     ///
     /// # Errors
-    /// [`Error::Usage`] if a count is 0 or absurd, a number is not finite, a step not positive, or an
+    /// [`Error::Argument`] if a count is 0 or absurd, a number is not finite, a step not positive, or an
     /// ellipsoidal grid reaches beyond a pole.
     pub fn new(
         cols: usize,
@@ -102,25 +102,24 @@ impl GridFrame {
         ground: Ground,
     ) -> Result<Self> {
         if cols == 0 || rows == 0 || cols.checked_mul(rows).is_none_or(|n| n > Self::MAX_NODES) {
-            return Err(Error::usage(format!(
-                "a grid of {cols} columns and {rows} rows is not possible; both must be at least 1 \
-                 and their product at most {}",
-                Self::MAX_NODES
-            )));
+            return Err(Error::argument(
+                "the size of the grid",
+                format!("{cols} columns × {rows} rows"),
+                format!("at least 1 × 1 and at most {} nodes", Self::MAX_NODES),
+            ));
         }
-        if !origin.is_finite() || !step.is_finite() || step.min_element() <= 0.0 {
-            return Err(Error::usage(format!(
-                "origin {origin} and cell size {step} must be finite numbers, the cell size positive"
-            )));
+        if !origin.is_finite() {
+            return Err(Error::argument("the origin of the grid", origin, "finite"));
+        }
+        if !step.is_finite() || step.min_element() <= 0.0 {
+            return Err(Error::argument("the cell size", step, "positive and finite"));
         }
         let frame = Self { cols, rows, origin, step, ground };
         if let Ground::Ellipsoid { .. } = ground {
             let south = frame.to_map(DVec2::new(0.0, (rows - 1) as f64)).y;
             if origin.y > 90.0 || south < -90.0 {
-                return Err(Error::usage(format!(
-                    "latitudes run from {south} to {} degrees; they must lie within -90 and 90",
-                    origin.y
-                )));
+                let found = format!("{south} to {} degrees", origin.y);
+                return Err(Error::argument("the range of latitudes", found, "within -90 and 90"));
             }
         }
         Ok(frame)

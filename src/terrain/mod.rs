@@ -10,6 +10,7 @@
 //!
 //! A new format is one file in `formats/` and one line in the list there.
 
+mod bands;
 mod crs;
 mod formats;
 mod georeference;
@@ -17,8 +18,9 @@ mod raster;
 #[expect(clippy::module_inception, reason = "the folder is called by what it makes")]
 mod terrain;
 
+pub use self::bands::{RasterBands, read_bands};
 pub use self::crs::Crs;
 pub(crate) use self::crs::GeoKeys;
 pub use self::georeference::Georeference;
-pub use self::raster::{RasterBands, read_bands};
-pub use self::terrain::{Source, Terrain};
+pub use self::raster::Source;
+pub use self::terrain::Terrain;

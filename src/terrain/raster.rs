@@ -1,4 +1,4 @@
-//! What a reader hands over, and the bands of rasters that hold no heights.
+//! What a reader hands over.
 
 use std::path::Path;
 
@@ -6,38 +6,43 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::Crs;
-use super::formats::{self, ReadMode};
-use super::terrain::Source;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
-
-/// The bands of a raster that does not hold heights.
-#[derive(Clone, Debug)]
-pub struct RasterBands {
-    /// The grid.
-    pub frame: GridFrame,
-    /// The coordinate reference system.
-    pub crs: Crs,
-    /// The values of each band, row-major from the north-west; `NaN` where there is no value.
-    pub bands: Vec<Vec<f64>>,
-}
-
-/// Reads all bands of a raster, such as a tensor field, in the formats that
-/// [`Terrain::open`](super::Terrain::open) reads.
-///
-/// # Errors
-/// As [`Terrain::open`](super::Terrain::open).
-pub fn read_bands(path: impl AsRef<Path>) -> Result<RasterBands> {
-    let path = path.as_ref();
-    let mut raster = formats::read(path, ReadMode::Bands)?;
-    let frame = raster.turn_north_up(path)?;
-    raster.bands.iter_mut().for_each(|band| void_infinite(band));
-    Ok(RasterBands { frame, crs: raster.crs, bands: raster.bands })
-}
 
 /// Infinite cells carry no value either.
 pub(super) fn void_infinite(values: &mut [f64]) {
     values.par_iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
+}
+
+/// What the file said of itself, for `info`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// Name of the format, such as `GeoTIFF` or `ESRI ASCII grid`.
+    pub format: String,
+    /// Sample type as stored, such as `int16`.
+    pub sample: String,
+    /// Unit of the stored heights, such as `metre` or `US survey foot`.
+    pub height_unit: String,
+    /// Metres in one such unit.
+    pub metres_per_height_unit: f64,
+    /// The nodata value of the file, as written.
+    pub nodata: Option<String>,
+    /// Whether the rows of the file ran from south to north and were turned.
+    pub south_up: bool,
+}
+
+impl Default for Source {
+    /// Heights in metres that come from no file.
+    fn default() -> Self {
+        Self {
+            format: "memory".to_owned(),
+            sample: "float64".to_owned(),
+            height_unit: "metre".to_owned(),
+            metres_per_height_unit: 1.0,
+            nodata: None,
+            south_up: false,
+        }
+    }
 }
 
 /// What a reader hands over: values as stored (scaled, not yet in metres), rows in the file's order.

@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::formats::{self, ReadMode};
-use super::raster::void_infinite;
+use super::raster::{Source, void_infinite};
 use super::{Crs, Georeference};
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
@@ -20,37 +20,6 @@ pub struct Terrain {
     heights: Vec<f64>,
     notes: Vec<String>,
     source: Source,
-}
-
-/// What the file said of itself, for `info`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Source {
-    /// Name of the format, such as `GeoTIFF` or `ESRI ASCII grid`.
-    pub format: String,
-    /// Sample type as stored, such as `int16`.
-    pub sample: String,
-    /// Unit of the stored heights, such as `metre` or `US survey foot`.
-    pub height_unit: String,
-    /// Metres in one such unit.
-    pub metres_per_height_unit: f64,
-    /// The nodata value of the file, as written.
-    pub nodata: Option<String>,
-    /// Whether the rows of the file ran from south to north and were turned.
-    pub south_up: bool,
-}
-
-impl Default for Source {
-    /// Heights in metres that come from no file.
-    fn default() -> Self {
-        Self {
-            format: "memory".to_owned(),
-            sample: "float64".to_owned(),
-            height_unit: "metre".to_owned(),
-            metres_per_height_unit: 1.0,
-            nodata: None,
-            south_up: false,
-        }
-    }
 }
 
 impl Terrain {

@@ -35,8 +35,6 @@ const KNOWN_CIRCLES: &[&str] = &[
     "eikonal/schedule",
     "surface",
     "surface/bspline",
-    "terrain",
-    "terrain/formats/tiff",
 ];
 
 #[test]

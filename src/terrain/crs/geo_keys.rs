@@ -1,9 +1,6 @@
-//! GeoKeys: what a GeoTIFF says of its CRS.
+//! GeoKeys: how a GeoTIFF says what its CRS is.
 
 use std::borrow::Cow;
-
-use super::{Crs, length_unit, unit_name};
-use crate::error::{Error, Result};
 
 /// The GeoKey directory of a GeoTIFF and the values it points to (OGC 19-008r4, section 7.1).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,7 +14,7 @@ pub(crate) struct GeoKeys {
 }
 
 /// Value of a key whose meaning the file spells out itself.
-const USER_DEFINED: u16 = 32767;
+pub(super) const USER_DEFINED: u16 = 32767;
 
 /// GeoKey numbers that are used (OGC 19-008r4, annex B).
 pub(in crate::terrain) mod key {
@@ -85,12 +82,12 @@ impl GeoKeys {
         self.short(key).filter(|code| *code != 0 && *code != USER_DEFINED).map(u32::from)
     }
 
-    fn double(&self, key: u16) -> Option<f64> {
+    pub(super) fn double(&self, key: u16) -> Option<f64> {
         let (location, _, offset) = self.find(key)?;
         (location == 34736).then(|| self.doubles.get(usize::from(offset)).copied()).flatten()
     }
 
-    fn text(&self, key: u16) -> Option<Cow<'_, str>> {
+    pub(super) fn text(&self, key: u16) -> Option<Cow<'_, str>> {
         let (location, count, offset) = self.find(key)?;
         let start = usize::from(offset);
         let text = (location == 34737).then(|| self.ascii.get(start..start + count)).flatten()?;
@@ -111,127 +108,5 @@ impl GeoKeys {
         kept.dedup_by_key(|e| e[0]);
         let directory = [&header[..3], &[kept.len() as u16], &kept.concat()].concat();
         Self { directory, ..self }
-    }
-
-    /// Metres per unit of a projected CRS; metres if nothing is said.
-    fn metres_per_unit(&self) -> Result<f64> {
-        match self.short(key::LINEAR_UNITS) {
-            None => Some(1.0),
-            Some(USER_DEFINED) => self.double(key::LINEAR_UNIT_SIZE).filter(|m| m.is_finite() && *m > 0.0),
-            Some(code) => length_unit(code).map(|(_, metres)| metres),
-        }
-        .ok_or_else(|| {
-            Error::usage(
-                "the unit of the map coordinates is not known, so the size of a cell on the ground is not either; \
-                 reproject with `gdalwarp -t_srs EPSG:...`, or name the right CRS with `gdal_edit.py -a_srs EPSG:...`",
-            )
-        })
-    }
-
-    fn crs_name(&self) -> Cow<'_, str> {
-        let citations = [key::PROJECTED_CITATION, key::CITATION, key::GEOGRAPHIC_CITATION];
-        citations.iter().find_map(|k| self.text(*k)).unwrap_or("unnamed".into())
-    }
-
-    /// A CRS of which only the unit is known, and perhaps a code.
-    pub(super) fn named_crs(&self) -> Option<Crs> {
-        self.short(key::LINEAR_UNITS)?;
-        let metres = self.metres_per_unit().ok()?;
-        Some(Crs {
-            epsg: self.code(key::PROJECTED_CRS),
-            ..Crs::named(&self.crs_name(), &unit_name(metres), metres)
-        })
-    }
-
-    pub(super) fn user_projected_crs(&self) -> Result<Crs> {
-        let name = self.crs_name();
-        let metres = self.metres_per_unit()?;
-        let plain = Crs::named(&name, &unit_name(metres), metres);
-        if name.contains("Pseudo-Mercator") || name.contains("Web_Mercator") {
-            return Crs::from_epsg(3857);
-        }
-        let (Some(conversion), Some((datum, caveat))) = (self.conversion(metres), self.datum())
-        else {
-            return Ok(plain);
-        };
-        let definition = format!("{conversion} {datum} +to_meter={metres} +no_defs");
-        Ok(match Crs::from_proj(&definition, &name) {
-            Ok(crs) => Crs { caveat: crs.caveat.or(caveat), ..crs },
-            Err(_) => plain,
-        })
-    }
-
-    pub(super) fn user_geographic_crs(&self) -> Result<Crs> {
-        let unit = self.short(key::ANGULAR_UNITS).unwrap_or(9102);
-        if !matches!(unit, 9102 | 9122) {
-            return Err(Error::usage(format!(
-                "angles are in EPSG unit {unit}, not degrees; reproject with `gdalwarp -t_srs EPSG:4326`"
-            )));
-        }
-        let Some((datum, caveat)) = self.datum() else {
-            return Err(Error::usage(
-                "a geographic CRS without an ellipsoid; name the right one with `gdal_edit.py -a_srs EPSG:...`",
-            ));
-        };
-        let crs = Crs::from_proj(&format!("+proj=longlat {datum} +no_defs"), &self.crs_name())?;
-        Ok(Crs { caveat: crs.caveat.or(caveat), ..crs })
-    }
-
-    /// The ellipsoid and datum shift in PROJ.4 notation, and a caveat if the shift is not known.
-    fn datum(&self) -> Option<(String, Option<String>)> {
-        // EPSG numbers a datum 6000 + n where the geographic CRS on it is 4000 + n, an ellipsoid 7000 + n
-        // where the CRS "on an unknown datum based upon it" is 4000 + n (OGC 19-008r4, annex C).
-        let coded = |key, base: u16| {
-            self.short(key).filter(|c| (base..base + 1000).contains(c)).map(|c| c - base + 4000)
-        };
-        let code = coded(key::GEOGRAPHIC_CRS, 4000).or_else(|| coded(key::GEODETIC_DATUM, 6000));
-        let tokens = |code| {
-            let definition = crs_definitions::from_code(code)?.proj4;
-            let rest = definition.strip_prefix("+proj=longlat ")?;
-            Some(rest.trim_end_matches("+no_defs").trim().to_owned())
-        };
-        if let Some(known) = code.and_then(tokens) {
-            return Some((known, None));
-        }
-        let semi_major = self.double(key::SEMI_MAJOR).filter(|a| a.is_finite() && *a > 0.0);
-        let ellipsoid = match (
-            semi_major,
-            self.double(key::INVERSE_FLATTENING),
-            self.double(key::SEMI_MINOR),
-        ) {
-            (Some(a), Some(rf), _) if rf > 1.0 => format!("+a={a} +rf={rf}"),
-            (Some(a), _, Some(b)) if b > 0.0 && b < a => format!("+a={a} +b={b}"),
-            (Some(a), ..) => format!("+R={a}"),
-            (None, ..) => tokens(coded(key::ELLIPSOID, 7000)?)?,
-        };
-        let on_earth = semi_major.is_none_or(|a| (a - 6_371_000.0).abs() < 20_000.0);
-        let caveat = "the file does not name its datum; longitudes and latitudes may be some hundred metres off";
-        Some((ellipsoid, on_earth.then(|| caveat.to_owned())))
-    }
-
-    /// The map projection in PROJ.4 notation, for the methods that DEMs come in.
-    fn conversion(&self, metres_per_unit: f64) -> Option<String> {
-        let first = |keys: &[u16]| keys.iter().find_map(|k| self.double(*k));
-        let lat_0 = first(&key::ORIGIN_LAT).unwrap_or(0.0);
-        let lon_0 = first(&key::ORIGIN_LON).unwrap_or(0.0);
-        let parallel_1 = self.double(key::STD_PARALLEL_1);
-        let parallel_2 = self.double(key::STD_PARALLEL_2).or(parallel_1);
-        let true_scale = parallel_1.map(|lat| format!(" +lat_ts={lat}")).unwrap_or_default();
-        let method = match self.short(key::METHOD)? {
-            1 => format!("+proj=tmerc +lat_0={lat_0}"),
-            7 => format!("+proj=merc{true_scale}"),
-            8 => format!("+proj=lcc +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
-            9 => format!("+proj=lcc +lat_1={lat_0} +lat_0={lat_0}"),
-            10 => format!("+proj=laea +lat_0={lat_0}"),
-            11 => format!("+proj=aea +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
-            15 => format!("+proj=stere +lat_0={} +lat_ts={lat_0}", 90f64.copysign(lat_0)),
-            17 => format!("+proj=eqc{true_scale} +lat_0={lat_0}"),
-            24 => "+proj=sinu".to_owned(),
-            _ => return None,
-        };
-        let scale = first(&key::SCALE).unwrap_or(1.0);
-        let [x_0, y_0] =
-            [key::EASTING, key::NORTHING].map(|k| first(&k).unwrap_or(0.0) * metres_per_unit);
-        Some(format!("{method} +lon_0={lon_0} +k={scale} +x_0={x_0} +y_0={y_0}"))
     }
 }

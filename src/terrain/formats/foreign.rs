@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::Head;
+use super::format::Head;
 use crate::error::{Error, Result};
 
 const CONVERT: &str = "convert it with `gdal_translate IN OUT.tif`";

@@ -9,10 +9,10 @@ use std::path::Path;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::format::{Format, ReadMode};
 use super::tiff::{
     Directory, Layout, Sample, Tiff, TiffError, TiffResult, damaged, is_tiff, tag, unsupported,
 };
-use super::{Format, ReadMode};
 use crate::terrain::Source;
 use crate::terrain::crs::{Crs, GeoKeys, key, length_unit};
 use crate::terrain::raster::Raster;

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::DVec2;
 
-use super::{Format, Head, ReadMode};
+use super::format::{Format, Head, ReadMode};
 use crate::error::{Error, Result};
 use crate::terrain::raster::Raster;
 use crate::terrain::{Crs, Source};

@@ -4,6 +4,7 @@
 
 mod ascii_grid;
 mod foreign;
+mod format;
 mod geotiff;
 mod hgt;
 mod tiff;
@@ -12,64 +13,13 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+pub(super) use self::format::ReadMode;
+use self::format::{Format, Head};
 use super::raster::Raster;
 use crate::error::{Error, Result};
 
 /// All formats, in the order in which a file is offered to them: those that know their own beyond doubt first.
 const FORMATS: [Format; 3] = [geotiff::FORMAT, ascii_grid::FORMAT, hgt::FORMAT];
-
-/// A format that is read.
-struct Format {
-    /// Its name, for people.
-    name: &'static str,
-    /// Whether the file is of this format beyond doubt.
-    is_own: fn(&Head) -> bool,
-    /// Lower-case extensions of files that are taken for this format where nothing else is known of them.
-    extensions: &'static [&'static str],
-    /// Reads a file whose content is given; the path is for messages, for files beside, and where the name tells the place.
-    read: fn(&Path, &[u8], ReadMode) -> Result<Raster>,
-}
-
-/// What a reader is asked for.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum ReadMode {
-    /// The first band, which must be heights.
-    Heights,
-    /// All bands, whatever they are.
-    Bands,
-}
-
-/// What a format is told by: the beginning of a file and its name.
-struct Head<'a> {
-    bytes: &'a [u8],
-    /// The same as lower-case text, without what may stand before the first word.
-    text: String,
-    /// The extension in lower case; empty if there is none.
-    extension: String,
-    /// The extension before the last one: `hgt` of `N42E001.hgt.gz`.
-    inner_extension: String,
-}
-
-impl<'a> Head<'a> {
-    /// Bytes that suffice to tell a format.
-    const LENGTH: u64 = 512;
-
-    fn new(path: &Path, bytes: &'a [u8]) -> Self {
-        let text = String::from_utf8_lossy(bytes);
-        let text = text.trim_start_matches('\u{feff}').trim_start().to_ascii_lowercase();
-        let inner = path.file_stem().map(Path::new);
-        Self {
-            bytes,
-            text,
-            extension: extension(path),
-            inner_extension: inner.map(extension).unwrap_or_default(),
-        }
-    }
-}
-
-fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
-}
 
 /// Reads a file of any of the formats.
 ///
