@@ -25,7 +25,7 @@ pub(super) const FORMAT: Format = Format {
 };
 
 fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
-    let images = Tiff::new(bytes)?.directories()?;
+    let images = Directory::all(Tiff::new(bytes)?)?;
     let mut notes = Vec::new();
     let image = full_resolution(&images, &mut notes)?;
     let layout = Layout::new(image)?;
