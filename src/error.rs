@@ -357,7 +357,7 @@ fn size(bytes: u64) -> String {
 fn cause(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => "there is no such file".into(),
-        io::ErrorKind::IsADirectory => "is a folder, not a file".into(),
+        io::ErrorKind::IsADirectory => "is a folder".into(),
         io::ErrorKind::AlreadyExists => "exists".into(),
         io::ErrorKind::PermissionDenied => "permission denied".into(),
         _ => source.to_string(),

@@ -429,8 +429,8 @@ fn bad_input_is_named() {
     folder.bad(
         "route plain.tif --start huts.geojson --goal pixel:3,4",
         2,
-        "huts.geojson: the terrain has no CRS, so there is no way to longitude and latitude; \
-         give places in map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+        "huts.geojson: the CRS is unknown; it must be one that leads to longitude and latitude; \
+         use map or grid coordinates, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
     );
 }
 
@@ -508,8 +508,8 @@ fn places_off_the_ground_are_explained() {
     folder.bad(
         "route plain.tif --start lonlat:1,2 --goal pixel:4,1",
         2,
-        "the terrain has no CRS, so there is no way to longitude and latitude; give places in \
-         map coordinates or pixels, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+        "the CRS is unknown; it must be one that leads to longitude and latitude; use map or grid \
+         coordinates, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
     );
     folder.bad(
         "route range.tif --start pixel:3,3 --goal wall.geojson",
@@ -617,7 +617,7 @@ fn bad_flags_are_explained() {
     folder.bad(
         "synth hills -o x.tif",
         2,
-        "no synthetic terrain is called \"hills\"; there are plane, cylinder, sphere, cone, bumps, \
+        "the kind of terrain is `hills`; it must be one of plane, cylinder, sphere, cone, bumps, \
          four-bumps, range, fractal, craters, switchbacks",
     );
     folder.bad(
@@ -775,7 +775,7 @@ fn match_refuses_what_it_cannot_compare() {
     folder.bad(
         "match sheet.json --nodes 1x20",
         2,
-        "the number of nodes in the first direction of the surface is 1; between 2 and 100000 are possible",
+        "the number of nodes in the first direction of the surface is 1; it must be between 2 and 100000",
     );
     assert_eq!(folder.run("match range.tif plain.tif range.tif").code, 2);
     assert_eq!(folder.run("match nowhere.json").code, 3);
@@ -839,13 +839,17 @@ fn every_command_names_the_file_it_cannot_read() {
     for (file, code, said) in [
         ("missing.tif", 3, "there is no such file; check its name and the folder you are in"),
         ("folder", 3, "is a folder; name a file"),
-        ("empty.tif", 2, "the file is empty"),
+        ("empty.tif", 2, "the file is empty; it must be a DEM"),
     ] {
         for line in commands(file) {
             folder.bad(&line, code, &format!("{file}: {said}"));
         }
     }
-    folder.bad("match empty.json", 2, "empty.json: the file is empty");
+    folder.bad(
+        "match empty.json",
+        2,
+        "empty.json: the file is empty; it must be a surface in JSON",
+    );
     folder.bad(
         &format!("route range.tif {places} --barrier empty.geojson"),
         2,
@@ -920,7 +924,7 @@ fn bad_radii_levels_and_surfaces_are_refused() {
     folder.bad(
         "match list.json",
         2,
-        "list.json: not a surface in JSON: invalid length 0, expected an object with degree, knots \
+        "list.json: the surface in JSON is damaged: invalid length 0, expected an object with degree, knots \
          and points at line 1 column 2",
     );
     let many = folder.run("match range.tif --nodes 99999x99999");

@@ -20,23 +20,25 @@ impl NurbsCurve {
     /// The curve of `points`, each `(x, y, z, weight)`, in metres. A closed one ends where it began.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the number of points is not that of the knots' splines, a number is out of range as in
+    /// [`Error::Argument`] if the number of points is not that of the knots' splines, a number is out of range as in
     /// [`NurbsSurface::new`](super::NurbsSurface::new), or a closed curve does not end where it began.
     pub fn new(knots: Knots, closed: bool, points: &[DVec4]) -> Result<Self> {
         if points.len() != knots.controls() {
-            return Err(Error::usage(format!(
-                "{} control points for knots that need {}",
+            return Err(Error::argument(
+                "the number of control points",
                 points.len(),
-                knots.controls()
-            )));
+                format!("{}, as the knots say", knots.controls()),
+            ));
         }
         let net = homogeneous(points)?;
         check_weights(&net)?;
         let curve = Self { knots, closed, net };
         let [from, to] = curve.knots.domain().map(|u| [curve.homogeneous_at(u)]);
         if closed && !coincide(&from, &to, size(&curve.net)) {
-            return Err(Error::usage(
-                "a curve that is said to be closed does not end where it began",
+            return Err(Error::argument(
+                "the end of a closed curve",
+                "not its beginning",
+                "the same point",
             ));
         }
         Ok(curve)
@@ -45,7 +47,7 @@ impl NurbsCurve {
     /// The curve of a degree through points, its parameter in proportion to the chords between them (The NURBS Book, algorithm A9.1).
     ///
     /// # Errors
-    /// [`Error::Usage`] if there are fewer than `degree + 1` points, two that follow each other coincide, or one is out of range.
+    /// [`Error::Argument`] if there are fewer than `degree + 1` points, two that follow each other coincide, or one is out of range.
     pub fn through(points: &[DVec3], degree: usize) -> Result<Self> {
         let points: Vec<DVec4> = points.iter().map(|p| p.extend(1.0)).collect();
         let net = homogeneous(&points)?;
@@ -146,20 +148,21 @@ pub(super) fn interpolating(
     let mut places = vec![0.0];
     for chord in chords {
         if !(chord > 0.0 && chord.is_finite()) {
-            return Err(Error::usage(format!(
-                "points {} and {} coincide; a spline goes through points apart",
-                places.len() - 1,
-                places.len()
-            )));
+            return Err(Error::argument(
+                format!("the distance of points {} and {}", places.len() - 1, places.len()),
+                chord,
+                "above 0 and finite, for a spline goes through points apart",
+            ));
         }
         places.push(places[places.len() - 1] + chord);
     }
     let last = places.len() - 1;
     if last < degree || last >= Knots::MAX_CONTROLS {
-        return Err(Error::usage(format!(
-            "{} points for a spline of degree {degree}",
-            places.len()
-        )));
+        return Err(Error::argument(
+            "the number of points of a spline",
+            places.len(),
+            format!("above the degree {degree} and at most {}", Knots::MAX_CONTROLS),
+        ));
     }
     let total = places[last];
     places.iter_mut().for_each(|place| *place /= total);

@@ -33,16 +33,18 @@ impl TryFrom<Schema> for NurbsSurface {
         let knots = [Knots::new(degree[0], first)?, Knots::new(degree[1], second)?];
         let [cols, rows] = [knots[0].controls(), knots[1].controls()];
         if points.len() != rows {
-            return Err(Error::usage(format!(
-                "{} rows of control points; the second knots need {rows}",
-                points.len()
-            )));
+            return Err(Error::argument(
+                "the number of rows of control points",
+                points.len(),
+                format!("{rows}, as the second knots say"),
+            ));
         }
         if let Some(row) = points.iter().position(|row| row.len() != cols) {
-            return Err(Error::usage(format!(
-                "{} control points in row {row}; the first knots need {cols}",
-                points[row].len()
-            )));
+            return Err(Error::argument(
+                format!("the number of control points in row {row}"),
+                points[row].len(),
+                format!("{cols}, as the first knots say"),
+            ));
         }
         let points: Vec<DVec4> = points.into_iter().flatten().map(DVec4::from).collect();
         Self::new(knots, closed, &points)
@@ -65,36 +67,38 @@ impl NurbsSurface {
     /// Reads a surface from a JSON file.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if it is no JSON of this schema, longer than 256 MiB, or no surface, see
+    /// [`Error::Io`]; [`Error::TooLarge`] beyond 256 MiB; [`Error::Format`] if it is no JSON of this schema or no surface, see
     /// [`new`](Self::new) and [`Knots`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         let mut text = Vec::new();
-        file.take(LONGEST + 1).read_to_end(&mut text).map_err(|e| Error::io(path, e))?;
+        (&file).take(LONGEST + 1).read_to_end(&mut text).map_err(|e| Error::io(path, e))?;
         if text.len() as u64 > LONGEST {
-            return Err(Error::format(
-                path,
-                format!("longer than {LONGEST} bytes, which no surface is"),
-            ));
+            let length = file.metadata().map_or(LONGEST + 1, |metadata| metadata.len());
+            return Err(Error::TooLarge {
+                what: format!("the file {}", path.display()),
+                bytes: length,
+                limit: Some(LONGEST),
+            });
         }
         if text.is_empty() {
-            return Err(Error::format(path, "the file is empty"));
+            return Err(Error::argument("the file", "empty", "a surface in JSON").in_file(path));
         }
-        Self::parse(&text).map_err(|e| Error::format(path, e.to_string()))
+        Self::parse(&text).map_err(|e| e.in_file(path))
     }
 
     /// The surface of a JSON text.
     ///
     /// # Errors
-    /// [`Error::Usage`] that tells what is wrong.
+    /// [`Error::Argument`] that tells what is wrong.
     pub fn from_json(text: &str) -> Result<Self> {
         Self::parse(text.as_bytes())
     }
 
     fn parse(text: &[u8]) -> Result<Self> {
-        let schema: Schema = serde_json::from_slice(text)
-            .map_err(|e| Error::usage(format!("not a surface in JSON: {e}")))?;
+        let schema: Schema =
+            serde_json::from_slice(text).map_err(|e| Error::damaged("the surface in JSON", e))?;
         schema.try_into()
     }
 
@@ -124,18 +128,22 @@ mod tests {
         for (from, to, said) in [
             ("[0, 0, 1, 1], [", "[0, 1, 0, 1], [", "ascend"),
             ("[0, 0, 1, 1], [", "[0, 0, 1], [", "4 or more"),
-            ("[0, 0, 1, 1], [", "[0, 0, 0.5, 1, 1], [", "2 control points in row 0"),
-            ("[1, 1]", "[1, 99]", "degree 99"),
-            ("[1, 1]", "[1, -1]", "not a surface in JSON"),
+            ("[0, 0, 1, 1], [", "[0, 0, 0.5, 1, 1], [", "control points in row 0 is 2"),
+            ("[1, 1]", "[1, 99]", "degree of a spline is 99"),
+            ("[1, 1]", "[1, -1]", "surface in JSON is damaged"),
             ("[1, 0, 0, 1]", "[1, 0, 0, 0]", "weight of control point 1 is 0"),
             ("[1, 0, 0, 1]", "[1, 0, 0, -1]", "weight of control point 1 is -1"),
-            ("[1, 0, 0, 1]", "[1e999, 0, 0, 1]", "not a surface in JSON"),
+            ("[1, 0, 0, 1]", "[1e999, 0, 0, 1]", "surface in JSON is damaged"),
             ("[1, 0, 0, 1]", "[1e300, 0, 0, 1]", "control point 1 is at"),
-            ("[1, 0, 0, 1]", "[1, 0, 0]", "not a surface in JSON"),
-            ("[0, 1, 0, 1], [1, 1, 0, 2]", "[0, 0, 0, 1], [1, 0, 0, 2]", "no area"),
-            ("\"degree\"", "\"closed\": [true, false], \"degree\"", "does not end where it began"),
+            ("[1, 0, 0, 1]", "[1, 0, 0]", "surface in JSON is damaged"),
+            ("[0, 1, 0, 1], [1, 1, 0, 2]", "[0, 0, 0, 1], [1, 0, 0, 2]", "the area between"),
+            (
+                "\"degree\"",
+                "\"closed\": [true, false], \"degree\"",
+                "the end of the surface in the closed first direction",
+            ),
             ("\"degree\"", "\"colour\": 1, \"degree\"", "unknown field"),
-            ("}", "", "not a surface in JSON"),
+            ("}", "", "surface in JSON is damaged"),
         ] {
             assert!(PLANE.contains(from), "{from}");
             let error =

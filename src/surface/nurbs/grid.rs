@@ -35,18 +35,21 @@ impl NurbsSurface {
     /// The surface with `cols` nodes along its first and `rows` along its second parameter.
     ///
     /// # Errors
-    /// [`Error::Usage`] for fewer than 2 nodes in a direction, 3 in a closed one, or more than 100 000.
+    /// [`Error::Argument`] for fewer than 2 nodes in a direction, 3 in a closed one, or more than 100 000.
     pub fn on_grid(self, cols: usize, rows: usize) -> Result<NurbsGrid> {
         let nodes = [cols, rows];
         let mut bounds = [[0.0; 2]; 2];
         for axis in [0, 1] {
             let least = if self.closed[axis] { 3 } else { 2 };
             if !(least..=MOST).contains(&nodes[axis]) {
-                return Err(Error::usage(format!(
-                    "the number of nodes in the {} direction of the surface is {}; between {least} and {MOST} are possible",
-                    ["first", "second"][axis],
-                    nodes[axis]
-                )));
+                return Err(Error::argument(
+                    format!(
+                        "the number of nodes in the {} direction of the surface",
+                        ["first", "second"][axis]
+                    ),
+                    nodes[axis],
+                    format!("between {least} and {MOST}"),
+                ));
             }
             let [first, last] = self.edges(axis).map(|edge| size(&edge) <= SMALL * self.size());
             let inside = |is_pole: bool| if is_pole { INSIDE } else { 0.0 };

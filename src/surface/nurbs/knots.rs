@@ -29,55 +29,58 @@ impl Knots {
     pub const MAX_CONTROLS: usize = 1_000_000;
 
     /// # Errors
-    /// [`Error::Usage`] that tells which invariant does not hold.
+    /// [`Error::Argument`] that tells which invariant does not hold.
     pub fn new(degree: usize, knots: Vec<f64>) -> Result<Self> {
         if !(1..=Self::MAX_DEGREE).contains(&degree) {
             let most = Self::MAX_DEGREE;
-            return Err(Error::usage(format!(
-                "a spline of degree {degree}; 1 to {most} are possible"
-            )));
+            return Err(Error::argument("the degree of a spline", degree, format!("1 to {most}")));
         }
         if knots.len() < 2 * (degree + 1) {
-            return Err(Error::usage(format!(
-                "{} knots; a spline of degree {degree} has {} or more",
+            return Err(Error::argument(
+                "the number of knots",
                 knots.len(),
-                2 * (degree + 1)
-            )));
+                format!("{} or more for degree {degree}", 2 * (degree + 1)),
+            ));
         }
         if let Some(i) = knots.iter().position(|u| !u.is_finite()) {
-            return Err(Error::usage(format!("knot {i} is {}; it must be finite", knots[i])));
+            return Err(Error::argument(format!("knot {i}"), knots[i], "finite"));
         }
         if let Some(i) = knots.windows(2).position(|pair| pair[0] > pair[1]) {
-            return Err(Error::usage(format!(
-                "knot {} is {} after {}; knots must ascend",
-                i + 1,
+            return Err(Error::argument(
+                format!("knot {}", i + 1),
                 knots[i + 1],
-                knots[i]
-            )));
+                format!("{} or more, as knots ascend", knots[i]),
+            ));
         }
         let knots = Self { degree, knots };
         let [from, to] = knots.domain();
         let length = to - from;
         if !(length > 0.0 && length.is_finite()) {
-            return Err(Error::usage(format!("the knots leave nothing between {from} and {to}")));
+            return Err(Error::argument(
+                format!("the length of the domain from knot {from} to {to}"),
+                length,
+                "above 0 and finite",
+            ));
         }
         if let Some(pair) = knots.knots.windows(2).find(|pair| {
             let step = pair[1] - pair[0];
             step > 0.0 && step <= NARROWEST * length
         }) {
-            return Err(Error::usage(format!(
-                "the knots {} and {} all but coincide; make them equal or move them apart",
-                pair[0], pair[1]
-            )));
+            return Err(Error::argument(
+                format!("the distance of the knots {} and {}", pair[0], pair[1]),
+                pair[1] - pair[0],
+                format!("0, or above {NARROWEST:e} of the domain"),
+            )
+            .advise("make them equal or move them apart"));
         }
         let often = |u: f64| knots.multiplicity(u);
         let most = |u: f64| if from < u && u < to { degree } else { degree + 1 };
         if let Some(&u) = knots.knots.iter().find(|&&u| often(u) > most(u)) {
-            return Err(Error::usage(format!(
-                "the knot {u} comes {} times; at degree {degree} it may come {} times",
+            return Err(Error::argument(
+                format!("the multiplicity of the knot {u}"),
                 often(u),
-                most(u)
-            )));
+                format!("at most {} at degree {degree}", most(u)),
+            ));
         }
         Ok(knots)
     }
@@ -88,9 +91,11 @@ impl Knots {
     /// A degree out of range, fewer than `degree + 1` control points or more than [`MAX_CONTROLS`](Self::MAX_CONTROLS).
     pub fn clamped(degree: usize, controls: usize) -> Result<Self> {
         if controls <= degree || controls > Self::MAX_CONTROLS {
-            return Err(Error::usage(format!(
-                "{controls} control points for a spline of degree {degree}"
-            )));
+            return Err(Error::argument(
+                "the number of control points",
+                controls,
+                format!("above the degree {degree} and at most {}", Self::MAX_CONTROLS),
+            ));
         }
         let pieces = controls - degree;
         let inner = (1..pieces).map(|i| i as f64 / pieces as f64);
@@ -187,9 +192,7 @@ impl Knots {
     pub(super) fn inserted(&self, u: f64) -> Result<(Self, Vec<f64>)> {
         let [from, to] = self.domain();
         if !(from < u && u < to) {
-            return Err(Error::usage(format!(
-                "a knot at {u} cannot be inserted; it must lie between {from} and {to}"
-            )));
+            return Err(Error::argument("a new knot", u, format!("between {from} and {to}")));
         }
         let (span, p) = (self.span(u), self.degree);
         let mut knots = self.knots.clone();
@@ -221,10 +224,11 @@ impl Knots {
         let share = |u: f64| (u - from) / (to - from);
         let pole = |&u: &f64| 1.0 + (ratio - 1.0) * share(u);
         if !(ratio.is_finite() && ratio > 0.0) || self.knots.iter().any(|u| pole(u) <= 0.0) {
-            return Err(Error::usage(format!(
-                "a Möbius map of ratio {ratio} is not possible on these knots; it must be above 0, and on knots beyond the \
-                 domain not far from 1"
-            )));
+            return Err(Error::argument(
+                "the ratio of a Möbius map",
+                ratio,
+                "above 0, and on knots beyond the domain not far from 1",
+            ));
         }
         let image = |u: &f64| ratio * share(*u) / pole(u);
         // Rounding must not move the ends.
@@ -284,15 +288,15 @@ mod tests {
     #[test]
     fn wrong_knots_are_told() {
         for (degree, knots, said) in [
-            (0, vec![0.0, 1.0], "degree 0"),
-            (99, vec![0.0; 300], "degree 99"),
+            (0, vec![0.0, 1.0], "degree of a spline is 0"),
+            (99, vec![0.0; 300], "is 99"),
             (2, vec![0.0, 0.0, 0.0, 1.0, 1.0], "6 or more"),
             (1, vec![0.0, 0.0, f64::NAN, 1.0, 1.0], "finite"),
             (1, vec![0.0, 0.0, 0.7, 0.5, 1.0, 1.0], "ascend"),
-            (1, vec![0.0, 0.0, 0.5, 0.5, 1.0, 1.0], "comes 2 times"),
-            (1, vec![0.0, 0.0, 0.0, 0.5, 1.0, 1.0], "comes 3 times"),
-            (1, vec![1.0; 6], "nothing between"),
-            (1, vec![0.0, 0.0, 1e-12, 1.0, 1.0], "all but coincide"),
+            (1, vec![0.0, 0.0, 0.5, 0.5, 1.0, 1.0], "knot 0.5 is 2"),
+            (1, vec![0.0, 0.0, 0.0, 0.5, 1.0, 1.0], "knot 0 is 3"),
+            (1, vec![1.0; 6], "length of the domain"),
+            (1, vec![0.0, 0.0, 1e-12, 1.0, 1.0], "make them equal"),
         ] {
             let error = Knots::new(degree, knots).unwrap_err().to_string();
             assert!(error.contains(said), "{error}");

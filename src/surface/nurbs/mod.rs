@@ -52,17 +52,17 @@ impl NurbsSurface {
     /// parameter first.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there is not one point per pair of splines; if a coordinate is not finite or beyond 1e14 m; if a
+    /// [`Error::Argument`] if there is not one point per pair of splines; if a coordinate is not finite or beyond 1e14 m; if a
     /// weight is not between 1e-9 and 1e9; if a direction that is to be closed does not end where it began; if a whole patch
     /// between knots has no area.
     pub fn new(knots: [Knots; 2], closed: [bool; 2], points: &[DVec4]) -> Result<Self> {
         let [cols, rows] = [knots[0].controls(), knots[1].controls()];
         if points.len() != cols * rows || points.len() > Knots::MAX_CONTROLS {
-            return Err(Error::usage(format!(
-                "{} control points for knots that need {cols} × {rows}; at most {} are possible",
+            return Err(Error::argument(
+                "the number of control points",
                 points.len(),
-                Knots::MAX_CONTROLS
-            )));
+                format!("{cols} × {rows}, as the knots say, and at most {}", Knots::MAX_CONTROLS),
+            ));
         }
         Self::from_net(knots, closed, homogeneous(points)?)
     }
@@ -75,9 +75,11 @@ impl NurbsSurface {
             let [first, last] = surface.edges(axis);
             if closed[axis] && !coincide(&first, &last, surface.size()) {
                 let name = ["first", "second"][axis];
-                return Err(Error::usage(format!(
-                    "the surface is said to be closed in the {name} direction, but does not end where it began"
-                )));
+                return Err(Error::argument(
+                    format!("the end of the surface in the closed {name} direction"),
+                    "not its beginning",
+                    "the same line",
+                ));
             }
         }
         surface.check_patches()?;
@@ -254,10 +256,14 @@ impl NurbsSurface {
                         && jet.first[1].length() * by.y > least
                 };
                 if !places.into_iter().any(has_area) {
-                    return Err(Error::usage(format!(
-                        "the surface has no area between the knots {from1} and {to1} of the first parameter, {from2} and \
-                         {to2} of the second"
-                    )));
+                    return Err(Error::argument(
+                        format!(
+                            "the area between the knots {from1} and {to1} of the first parameter, {from2} and {to2} of \
+                             the second"
+                        ),
+                        0,
+                        "above 0",
+                    ));
                 }
             }
         }
@@ -272,11 +278,11 @@ impl NurbsSurface {
 fn homogeneous(points: &[DVec4]) -> Result<Vec<DVec4>> {
     let fits = |p: &DVec4| p.xyz().abs().max_element() <= FARTHEST && p.is_finite();
     if let Some(i) = points.iter().position(|p| !fits(p)) {
-        return Err(Error::usage(format!(
-            "control point {i} is at {:?} with weight {:?}; it must be finite and at most {FARTHEST:e} m from the origin",
-            points[i].xyz().to_array(),
-            points[i].w
-        )));
+        return Err(Error::argument(
+            format!("control point {i}"),
+            format!("at {:?} with weight {:?}", points[i].xyz().to_array(), points[i].w),
+            format!("finite and at most {FARTHEST:e} m from the origin"),
+        ));
     }
     let net = points.iter().map(|p| (p.xyz() * p.w).extend(p.w)).collect();
     Ok(net)
@@ -286,11 +292,11 @@ fn homogeneous(points: &[DVec4]) -> Result<Vec<DVec4>> {
 /// A weight out of range.
 fn check_weights(net: &[DVec4]) -> Result<()> {
     match net.iter().position(|p| !(LIGHTEST..=LIGHTEST.recip()).contains(&p.w)) {
-        Some(i) => Err(Error::usage(format!(
-            "the weight of control point {i} is {:?}; it must be between {LIGHTEST:.0e} and {:.0e}",
-            net[i].w,
-            LIGHTEST.recip()
-        ))),
+        Some(i) => Err(Error::argument(
+            format!("the weight of control point {i}"),
+            format!("{:?}", net[i].w),
+            format!("between {LIGHTEST:.0e} and {:.0e}", LIGHTEST.recip()),
+        )),
         None => Ok(()),
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec3, DVec4, Vec4Swizzles};
 
 use super::curve::{inserted, interpolated, interpolating, ring, ring_knots};
 use super::{Knots, NurbsCurve, NurbsSurface, SMALL};
-use crate::error::{Error, Result};
+use crate::error::{Error, Location, Result};
 
 impl NurbsSurface {
     /// The surface that a profile makes when it turns about the line through `origin` along `axis`, exactly (The NURBS Book,
@@ -15,11 +15,10 @@ impl NurbsSurface {
     /// has a pole.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an axis without direction, and as [`new`](Self::new): a profile that lies on the axis.
+    /// [`Error::Argument`] for an axis without direction, and as [`new`](Self::new): a profile that lies on the axis.
     pub fn revolve(profile: &NurbsCurve, origin: DVec3, axis: DVec3) -> Result<Self> {
-        let axis = axis
-            .try_normalize()
-            .ok_or_else(|| Error::usage(format!("the axis {axis} has no direction")))?;
+        let axis =
+            axis.try_normalize().ok_or_else(|| Error::argument("the axis", axis, "a direction"))?;
         let around = |p: &DVec4| {
             let arm = p.xyz() / p.w - origin;
             let out = arm.reject_from_normalized(axis);
@@ -44,7 +43,7 @@ impl NurbsSurface {
     /// 10.3). Closed along the sections if all are closed.
     ///
     /// # Errors
-    /// [`Error::Usage`] for fewer than `degree + 1` sections, sections of different degree, or that coincide, and as
+    /// [`Error::Argument`] for fewer than `degree + 1` sections, sections of different degree, or that coincide, and as
     /// [`new`](Self::new).
     pub fn loft(sections: &[NurbsCurve], degree: usize) -> Result<Self> {
         let (along, lines) = on_common_knots(sections)?;
@@ -73,7 +72,7 @@ impl NurbsSurface {
     /// outwards if the section runs counter-clockwise.
     ///
     /// # Errors
-    /// [`Error::Usage`] for fewer than 4 stations, a trajectory that stands still, or that begins along `up`, and as
+    /// [`Error::Argument`] for fewer than 4 stations, a trajectory that stands still, or that begins along `up`, and as
     /// [`new`](Self::new).
     pub fn sweep(
         section: &NurbsCurve,
@@ -83,9 +82,11 @@ impl NurbsSurface {
     ) -> Result<Self> {
         let most = Knots::MAX_CONTROLS / section.net.len();
         if !(4..=most).contains(&stations) {
-            return Err(Error::usage(format!(
-                "{stations} stations for a sweep; between 4 and {most} are possible"
-            )));
+            return Err(Error::argument(
+                "the number of stations of a sweep",
+                stations,
+                format!("between 4 and {most}"),
+            ));
         }
         let sections: Vec<NurbsCurve> = frames(trajectory, up, stations)?
             .into_iter()
@@ -116,8 +117,9 @@ fn frames(trajectory: &NurbsCurve, up: DVec3, count: usize) -> Result<Vec<Frame>
         let u = from + (to - from) * k as f64 / (count - 1) as f64;
         let at = trajectory.point(u);
         let along = trajectory.tangent(u).try_normalize();
-        let along =
-            along.ok_or_else(|| Error::usage(format!("the trajectory stands still at {at}")))?;
+        let along = along.ok_or_else(|| {
+            Error::argument("the speed of the trajectory", 0, "above 0").at(Location::Space(at))
+        })?;
         let carried = match frames.last() {
             Some(last) => {
                 let middle = last.reflected(at - last.at);
@@ -127,9 +129,11 @@ fn frames(trajectory: &NurbsCurve, up: DVec3, count: usize) -> Result<Vec<Frame>
         };
         let up = carried.reject_from_normalized(along);
         if up.length() <= SMALL * carried.length() {
-            return Err(Error::usage(format!(
-                "the trajectory begins along {carried}, which is to be up"
-            )));
+            return Err(Error::argument(
+                "the beginning of the trajectory",
+                format!("along {carried}, which is to be up"),
+                "in another direction",
+            ));
         }
         let up = up.normalize();
         frames.push(Frame { at, along, up });
@@ -152,10 +156,11 @@ impl Frame {
 fn on_common_knots(curves: &[NurbsCurve]) -> Result<(Knots, Vec<Vec<DVec4>>)> {
     let degree = curves.first().map_or(0, |curve| curve.knots.degree());
     if let Some(other) = curves.iter().find(|curve| curve.knots.degree() != degree) {
-        return Err(Error::usage(format!(
-            "sections of degree {degree} and {}; they must be of one degree",
-            other.knots.degree()
-        )));
+        return Err(Error::argument(
+            "the degree of a section",
+            other.knots.degree(),
+            format!("{degree}, that of the first"),
+        ));
     }
     let mut lines = Vec::with_capacity(curves.len());
     for curve in curves {
@@ -173,7 +178,8 @@ fn on_common_knots(curves: &[NurbsCurve]) -> Result<(Knots, Vec<Vec<DVec4>>)> {
         }
     }
     let knots = lines.first().map(|(knots, _)| knots.clone());
-    let knots = knots.ok_or_else(|| Error::usage("no sections for a loft"))?;
+    let knots =
+        knots.ok_or_else(|| Error::argument("the number of sections of a loft", 0, "1 or more"))?;
     Ok((knots, lines.into_iter().map(|(_, net)| net).collect()))
 }
 
