@@ -12,7 +12,9 @@ use glam::DVec2;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use ridgeway::eikonal::TensorField;
 use ridgeway::synthetic::{Synthetic, SyntheticKind};
-use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Stop};
+use ridgeway::{
+    Control, Crs, Curvature, FitOptions, HeightSurface, Isotropic, Metric, Modifiers, Stop,
+};
 
 use problems::{ACCURACIES, Problem, solver};
 
@@ -57,7 +59,8 @@ fn stages(criterion: &mut Criterion) {
             let pool = pool(threads);
             let id = |stage: &str| BenchmarkId::new(stage.to_owned(), threads);
             group.bench_function(id("fit"), |b| b.iter(|| pool.install(fit)));
-            for metric in [Metric::Isotropic, Metric::Curvature(Default::default())] {
+            let metrics: [&dyn Metric; 2] = [&Isotropic, &Curvature::default()];
+            for metric in metrics {
                 let metric = metric
                     .on(&surface, &Modifiers::default(), &Control::default())
                     .expect("default options");

@@ -5,11 +5,13 @@
 use std::f64::consts::TAU;
 
 use glam::DVec2;
+use ridgeway::metric::Tensor;
 use ridgeway::route::trace;
 use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
-    Control, Crs, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground, HeightSurface,
-    Metric, MetricField, Modifiers, Smoothing, Solver, Stop, Sym2, Terrain,
+    Control, Crs, Curvature, Degree, Delta, DistanceMap, Error, FitOptions, GridFrame, Ground,
+    HeightSurface, Isotropic, Metric, MetricField, Modifiers, Smoothing, Solver, Stop, Sym2,
+    Terrain,
 };
 
 const RESOLUTIONS: [usize; 4] = [101, 201, 401, 801];
@@ -44,8 +46,12 @@ fn surface(n: usize, height: impl Fn(DVec2) -> f64) -> Result<HeightSurface, Err
     HeightSurface::fit(&terrain, &options, &Control::default())
 }
 
+fn map_of<'a>(metric: &MetricField<'a>) -> &'a GridFrame {
+    metric.surface().frame().expect("a heightmap")
+}
+
 fn solve(metric: &MetricField<'_>, start: DVec2) -> Result<DistanceMap, Error> {
-    let start = metric.surface().frame().to_grid(start);
+    let start = map_of(metric).to_grid(start);
     Solver::default().solve(metric, &[start.into()], &Stop::Never, &Control::default())
 }
 
@@ -75,7 +81,7 @@ fn row(case: &str, error: impl Fn(usize) -> Result<f64, Error>) -> Result<(), Er
 fn directions() -> Result<(), Error> {
     let n = 441;
     let plane = surface(n, |_| 0.0)?;
-    let metric = Metric::Isotropic.on(&plane, &Modifiers::default(), &Control::default())?;
+    let metric = Isotropic.on(&plane, &Modifiers::default(), &Control::default())?;
     let map = solve(&metric, DVec2::ZERO)?;
     let radius = 200.0 / (n - 1) as f64;
     let worst = (0..3600)
@@ -95,7 +101,7 @@ fn farthest_off() -> Result<(), Error> {
     for ratio in [1.0, 4.0, 25.0, 100.0] {
         let along = DVec2::from_angle(0.5);
         let tensor = Sym2::outer(along) * ratio + Sym2::outer(along.perp());
-        let metric = Metric::Tensor(vec![tensor; n * n].into());
+        let metric = Tensor { tensors: vec![tensor; n * n].into() };
         let map =
             solve(&metric.on(&plane, &Modifiers::default(), &Control::default())?, DVec2::ZERO)?;
         let relative = |i: usize| {
@@ -116,7 +122,7 @@ fn constants() -> Result<(), Error> {
         let tensor = Sym2::outer(along) * ratio + Sym2::outer(along.perp());
         row(&format!("constant tensor, ratio {ratio}"), |n| {
             let plane = surface(n, |_| 0.0)?;
-            let metric = Metric::Tensor(vec![tensor; n * n].into());
+            let metric = Tensor { tensors: vec![tensor; n * n].into() };
             let map = solve(
                 &metric.on(&plane, &Modifiers::default(), &Control::default())?,
                 DVec2::ZERO,
@@ -126,10 +132,8 @@ fn constants() -> Result<(), Error> {
     }
     row("plane of slope 0.5, isotropic", |n| {
         let plane = surface(n, |at| 0.5 * at.x)?;
-        let map = solve(
-            &Metric::Isotropic.on(&plane, &Modifiers::default(), &Control::default())?,
-            DVec2::ZERO,
-        )?;
+        let map =
+            solve(&Isotropic.on(&plane, &Modifiers::default(), &Control::default())?, DVec2::ZERO)?;
         Ok(mean_error(&map, plane.frame(), |at| (1.25 * at.x * at.x + at.y * at.y).sqrt()))
     })
 }
@@ -147,12 +151,16 @@ fn unrolled(at: DVec2) -> DVec2 {
     DVec2::new(RADIUS * (at.x / RADIUS).asin(), at.y)
 }
 
-fn metrics() -> [(&'static str, Metric, DVec2); 2] {
+fn metrics() -> [(&'static str, Box<dyn Metric>, DVec2); 2] {
     // Slownesses along the arc and along the axis.
     let curved = (DELTA + 1.0 / RADIUS).sqrt();
     [
-        ("isotropic", Metric::Isotropic, DVec2::ONE),
-        ("curvature", Metric::Curvature(Delta::Absolute(DELTA)), DVec2::new(curved, DELTA.sqrt())),
+        ("isotropic", Box::new(Isotropic), DVec2::ONE),
+        (
+            "curvature",
+            Box::new(Curvature { delta: Delta::Absolute(DELTA) }),
+            DVec2::new(curved, DELTA.sqrt()),
+        ),
     ]
 }
 
@@ -191,7 +199,7 @@ fn deviation(
     goals: &[DVec2],
     unfold: impl Fn(DVec2) -> DVec2,
 ) -> Result<[f64; 2], Error> {
-    let frame = metric.surface().frame();
+    let frame = map_of(metric);
     let map = solve(metric, start)?;
     let mut worst = Vec::new();
     for &goal in goals {
@@ -233,7 +241,7 @@ fn routes() -> Result<(), Error> {
             let (a, b) = (0.1 * TAU * (TAU * at.y).cos(), 0.1 * TAU * (TAU * at.x).cos());
             Sym2::new(1.0 + b * b, a + b, 1.0 + a * a).inverse()
         });
-        let metric = Metric::Tensor(tensors.collect());
+        let metric = Tensor { tensors: tensors.collect() };
         let metric = metric.on(&plane, &Modifiers::default(), &Control::default())?;
         let [most, median] = deviation(&metric, DVec2::ZERO, &goals, phi)?;
         cells.push(format!("{most:.0e} ({median:.0e})"));

@@ -12,20 +12,21 @@ mod shapes;
 use glam::{DVec2, DVec3};
 use ridgeway::grid::{isolines, levels_by_step};
 use ridgeway::render::{Gradient, Rgb, SurfacePicture, beside, png};
-use ridgeway::{Delta, GridFrame, Ground, Metric};
+use ridgeway::{Curvature, GridFrame, Ground, Isotropic, Metric};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for metric in [Metric::Isotropic, Metric::Curvature(Delta::default())] {
+    let metrics: [&dyn Metric; 2] = [&Isotropic, &Curvature::default()];
+    for metric in metrics {
         println!(
             "{metric:?}: nodes, mean and greatest difference as shares of the greatest distance"
         );
         for n in [50, 100, 200, 400] {
-            let compared = parametrisations::compare(&metric, n)?;
+            let compared = parametrisations::compare(metric, n)?;
             let [mean, greatest] = [compared.mean_difference, compared.greatest_difference];
             println!("{:>4} × {:<4} {mean:.2e} {greatest:.2e}", 2 * n, n + 1);
         }
     }
-    let compared = parametrisations::compare(&Metric::Curvature(Delta::default()), 200)?;
+    let compared = parametrisations::compare(&Curvature::default(), 200)?;
     let mut pictures = Vec::new();
     for ((surface, map), title) in
         compared.surfaces.iter().zip(&compared.maps).zip(["as made", "reweighted"])

@@ -11,7 +11,7 @@ mod output;
 use glam::{DVec2, DVec3};
 use ridgeway::metric::{Difference, DifferenceForm};
 use ridgeway::render::{Rgb, SurfacePicture, beside, png};
-use ridgeway::{Delta, Metric};
+use ridgeway::{Curvature, Delta, Metric};
 
 use half_cylinders::{HalfCylinders, divide};
 
@@ -22,21 +22,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         curvature_delta: Delta::default(),
         delta: Delta::default(),
     };
-    let metrics = [
-        ("curvature tensor", Metric::Curvature(Delta::default())),
-        ("difference tensor", Metric::Difference(Difference::default())),
-        ("difference tensor, literal", Metric::Difference(literal)),
+    let metrics: [(&str, &dyn Metric); 3] = [
+        ("curvature tensor", &Curvature::default()),
+        ("difference tensor", &Difference::default()),
+        ("difference tensor, literal", &literal),
     ];
     println!("share of the nodes that fall to the seed of their own half");
     for nodes in [50, 100, 200, 400] {
         let surface = HalfCylinders { nodes };
-        for (name, metric) in &metrics {
+        for (name, metric) in metrics {
             println!("{nodes} x {nodes}, {name}: {:.4}", divide(&surface, metric)?.1);
         }
     }
     let surface = HalfCylinders { nodes: 100 };
     let mut pictures = Vec::new();
-    for (name, metric) in &metrics {
+    for (name, metric) in metrics {
         let (second, _) = divide(&surface, metric)?;
         let colour =
             |second: &bool| if *second { Rgb(0xf2, 0xb1, 0x34) } else { Rgb(0x5a, 0xa9, 0xe6) };

@@ -4,18 +4,15 @@
 
 use glam::DVec2;
 use ridgeway::{
-    Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain, route::trace,
+    Control, Curvature, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain,
+    route::trace,
 };
 
 fn main() -> Result<(), ridgeway::Error> {
     let control = Control::default();
     let terrain = Terrain::open("data/jacksboro.tif")?;
     let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control)?;
-    let metric = Metric::Curvature(Default::default()).on(
-        &surface,
-        &Modifiers::default(),
-        &Control::default(),
-    )?;
+    let metric = Curvature::default().on(&surface, &Modifiers::default(), &Control::default())?;
     let start = terrain.from_lonlat(DVec2::new(-84.38, 36.21))?;
     let goal = terrain.from_lonlat(DVec2::new(-84.10, 36.39))?;
     let distance =

@@ -9,7 +9,10 @@ use rayon::ThreadPoolBuilder;
 use ridgeway::eikonal::TensorField;
 use ridgeway::region::{Neighbours, SegmentOptions, Segmentation, signatures};
 use ridgeway::synthetic::{Synthetic, SyntheticKind};
-use ridgeway::{Control, Crs, FitOptions, HeightSurface, Metric, Modifiers, Result, Solver, Stop};
+use ridgeway::{
+    Control, Crs, Curvature, Difference, FitOptions, HeightSurface, Metric, Modifiers, Result,
+    Solver, Stop,
+};
 
 const STAGES: [&str; 5] = ["metric", "solve", "ranks", "cover, labels", "signatures"];
 
@@ -27,21 +30,21 @@ fn main() -> Result<()> {
         let range = Synthetic::new(SyntheticKind::Range, nodes, nodes, 30.0)?;
         let terrain = range.with_seed(1).terrain(Crs::none(), DVec2::ZERO)?;
         let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default())?;
-        let curvature = Metric::Curvature(Default::default());
-        let difference = Metric::Difference(Default::default());
-        for metric in [curvature, difference] {
+        let curvature = Curvature::default();
+        let difference = Difference::default();
+        let metrics: [&dyn Metric; 2] = [&curvature, &difference];
+        for metric in metrics {
             for threads in [1, 2] {
                 let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
                 let runs: Vec<_> = (0..if nodes > 300 { 5 } else { 21 })
-                    .map(|_| pool.install(|| stages(&surface, &metric)))
+                    .map(|_| pool.install(|| stages(&surface, metric)))
                     .collect::<Result<_>>()?;
                 let fastest = |stage: usize| {
                     runs.iter().map(|run| run.1[stage]).fold(f64::INFINITY, f64::min)
                 };
                 let times: String =
                     (0..STAGES.len()).map(|s| format!("{:>14.2}", fastest(s))).collect();
-                let name =
-                    if matches!(metric, Metric::Curvature(_)) { "curvature" } else { "difference" };
+                let name = metric.name();
                 println!("{name:>10} {nodes:>4}²     {threads:>7} {:>7} {times}", runs[0].0);
             }
         }
@@ -50,7 +53,10 @@ fn main() -> Result<()> {
 }
 
 /// Regions, and milliseconds of each stage, and of what belongs to none.
-fn stages(surface: &HeightSurface, metric: &Metric) -> Result<(usize, [f64; STAGES.len() + 1])> {
+fn stages(
+    surface: &HeightSurface,
+    metric: &dyn Metric,
+) -> Result<(usize, [f64; STAGES.len() + 1])> {
     let control = Control::default();
     let mut times = [0.0; STAGES.len() + 1];
     let mut clock = Instant::now();

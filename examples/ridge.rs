@@ -12,8 +12,8 @@ use glam::DVec2;
 use ridgeway::grid::isolines;
 use ridgeway::render::{IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::{
-    Comparison, Control, Crs, Delta, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric,
-    Modifiers, Smoothing, Solver, Terrain,
+    Comparison, Control, Crs, Curvature, Error, FitOptions, GridFrame, Ground, HeightSurface,
+    Isotropic, Metric, Modifiers, Smoothing, Solver, Terrain,
 };
 
 const N: usize = 161;
@@ -39,8 +39,8 @@ fn main() -> Result<(), Error> {
 
     let none = Modifiers::default();
     let metrics = [
-        Metric::Isotropic.on(&surface, &none, &Control::default())?,
-        Metric::Curvature(Delta::default()).on(&surface, &none, &Control::default())?,
+        Isotropic.on(&surface, &none, &Control::default())?,
+        Curvature::default().on(&surface, &none, &Control::default())?,
     ];
     let start = frame.to_grid(DVec2::new(0.0, -500.0));
     let goal = frame.to_grid(DVec2::new(0.0, 500.0));

@@ -1,6 +1,6 @@
 //! Ridgeway plans routes over terrain by *anisotropic geodesic* distance.
 //!
-//! Ordinary geodesics only shorten. On the curvature metric a step is dear where the ground bends along it, so
+//! Ordinary geodesics only shorten. On the curvature metric a step is costly where the ground bends along it, so
 //! routes keep to valleys, ridges and hillsides, as mountain roads do. The method is that of Seong, Jeong and
 //! Cohen, *Anisotropic Geodesic Distance Computation for Parametric Surfaces* (SMI 2008).
 //!
@@ -15,13 +15,13 @@
 //!
 //! ```
 //! use ridgeway::route::trace;
-//! use ridgeway::{Control, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain};
+//! use ridgeway::{Control, Curvature, FitOptions, HeightSurface, Metric, Modifiers, Solver, Stop, Terrain};
 //!
 //! # fn main() -> Result<(), ridgeway::Error> {
 //! let control = Control::default();
 //! let terrain = Terrain::open("data/jacksboro.tif")?;
 //! let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control)?;
-//! let metric = Metric::Curvature(Default::default()).on(&surface, &Modifiers::default(), &control)?;
+//! let metric = Curvature::default().on(&surface, &Modifiers::default(), &control)?;
 //!
 //! let start = terrain.frame().to_grid(glam::DVec2::new(-84.38, 36.21));
 //! let goal = terrain.frame().to_grid(glam::DVec2::new(-84.10, 36.39));
@@ -35,10 +35,10 @@
 //! * [`terrain`]: [`Terrain::open`] reads GeoTIFF, ESRI ASCII grids and SRTM tiles; [`synthetic`] makes terrains
 //!   with known answers. Heights are metres, voids `NaN`, row 0 is north.
 //! * [`surface`]: [`HeightSurface::fit`] makes the tensor-product B-spline `z(x, y)`; a [`HeightJet`] is its value and
-//!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape. Surfaces that are no terrain are
-//!   [`NurbsSurface`]s or the user's own [`ParametricSurface`]s: [`Metric::on_surface`], [`Solver::solve_field`] and
-//!   [`route::trace_on`] do the same on them.
-//! * [`metric`]: [`Metric::on`] binds a metric to a surface: [`MetricField::speed`] is the tensor `D` there.
+//!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape. What follows takes any [`Surface`]: a
+//!   [`NurbsGrid`] and a user's own as well.
+//! * [`metric`]: [`Metric::on`] binds a metric to a surface, [`Isotropic`], [`Curvature`], [`Difference`] or a user's own:
+//!   [`MetricField::speed`] is the tensor `D` there.
 //! * [`eikonal`]: [`Solver::solve`] solves `√(∇gᵀ D ∇g) = 1` from a [`StartRegion`] into a [`DistanceMap`].
 //! * [`route`]: [`route::trace`] descends on `g` from the goal; a [`Route`] carries its numbers; [`Comparison`] sets several
 //!   metrics side by side.
@@ -84,12 +84,13 @@ pub mod terrain;
 pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion, Stop};
 pub use error::{Error, Result};
+pub use glam;
 pub use grid::{GridFrame, Ground};
 pub use linalg::Sym2;
-pub use metric::{Delta, Metric, MetricField, Modifiers, SurfaceMetric};
+pub use metric::{Curvature, Delta, Difference, Isotropic, Metric, MetricField, Modifiers, Unit};
 pub use route::{Comparison, Route};
 pub use surface::{
-    Degree, FitOptions, HeightJet, HeightSurface, Knots, NurbsCurve, NurbsGrid, NurbsSurface,
-    ParametricSurface, Smoothing, SurfaceJet,
+    Degree, FitOptions, HeightJet, HeightSurface, Jet, Knots, NurbsCurve, NurbsGrid, NurbsSurface,
+    Smoothing, Surface, SurfaceJet,
 };
 pub use terrain::{Crs, Terrain};

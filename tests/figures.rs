@@ -20,15 +20,16 @@ mod waves;
 
 mod figure_5 {
     use glam::DVec2;
-    use ridgeway::{Delta, Metric, ParametricSurface};
+    use ridgeway::{Curvature, Isotropic, Metric, Surface};
 
     use crate::parametrisations;
 
     /// Distances do not depend on the parameters: they differ by the error of the solver, which falls with refinement.
     #[test]
     fn distances_agree_under_a_moebius_map() {
-        for metric in [Metric::Isotropic, Metric::Curvature(Delta::default())] {
-            let compared = [50, 100, 200].map(|n| parametrisations::compare(&metric, n).unwrap());
+        let metrics: [&dyn Metric; 2] = [&Isotropic, &Curvature::default()];
+        for metric in metrics {
+            let compared = [50, 100, 200].map(|n| parametrisations::compare(metric, n).unwrap());
             let [mean, greatest] = [
                 compared.each_ref().map(|c| c.mean_difference),
                 compared.each_ref().map(|c| c.greatest_difference),
@@ -43,7 +44,7 @@ mod figure_5 {
     /// The nodes are others: no row of one is a row of the other but at the ends.
     #[test]
     fn the_nodes_of_the_knights_differ() {
-        let compared = parametrisations::compare(&Metric::Isotropic, 50).unwrap();
+        let compared = parametrisations::compare(&Isotropic, 50).unwrap();
         let height = |surface: usize, row: usize| {
             compared.surfaces[surface].space_jet(DVec2::new(0.0, row as f64)).point.z
         };
@@ -55,8 +56,7 @@ mod figure_5 {
 }
 
 mod figure_8 {
-    use ridgeway::metric::Difference;
-    use ridgeway::{Delta, Metric};
+    use ridgeway::{Curvature, Difference, Metric};
 
     use crate::half_cylinders::{HalfCylinders, divide};
 
@@ -65,9 +65,9 @@ mod figure_8 {
     fn the_difference_tensor_finds_the_seam() {
         for nodes in [50, 100, 200] {
             let surface = HalfCylinders { nodes };
-            let right = |metric| divide(&surface, &metric).unwrap().1;
-            let curvature = right(Metric::Curvature(Delta::default()));
-            let difference = right(Metric::Difference(Difference::default()));
+            let right = |metric: &dyn Metric| divide(&surface, metric).unwrap().1;
+            let curvature = right(&Curvature::default());
+            let difference = right(&Difference::default());
             println!("{nodes}: {curvature:.4} {difference:.4}");
             assert!(curvature < 0.95, "{nodes}: {curvature}");
             // Within a column.

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use ridgeway::eikonal::TensorField;
 use ridgeway::region::{SegmentOptions, Segmentation, gaussian_ranks};
-use ridgeway::{Control, Delta, FitOptions, HeightJet, HeightSurface, Metric, Modifiers, Terrain};
+use ridgeway::{
+    Control, Curvature, FitOptions, HeightJet, HeightSurface, Isotropic, Metric, Modifiers, Terrain,
+};
 
 /// Mean over the nodes beside another region, and over the others, of the larger `|κ|`, 1/m.
 fn mean_curvatures(surface: &HeightSurface, cut: &Segmentation) -> [f64; 2] {
@@ -43,7 +45,7 @@ fn borders_fall_on_ridges_and_valleys() {
         let terrain = Terrain::open(&path).unwrap();
         let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
         let ranks = gaussian_ranks(&surface);
-        let ratio = |metric: Metric| {
+        let ratio = |metric: &dyn Metric| {
             let metric = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let field = TensorField::sample(&metric, &control).unwrap();
             // The radius that gives about so many regions, by bisection.
@@ -71,8 +73,8 @@ fn borders_fall_on_ridges_and_valleys() {
                 options.epsilons = vec![middle];
             }
         };
-        let curvature = ratio(Metric::Curvature(Delta::default()));
-        let geodesic = ratio(Metric::Isotropic);
+        let curvature = ratio(&Curvature::default());
+        let geodesic = ratio(&Isotropic);
         assert!(curvature > 1.1 && curvature > 1.05 * geodesic, "{dem}: {curvature} {geodesic}");
     }
 }

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use glam::DVec2;
 use ridgeway::route::trace;
 use ridgeway::{
-    Control, Delta, FitOptions, HeightSurface, Metric, Modifiers, Smoothing, Solver, Stop, Terrain,
+    Control, Curvature, Delta, FitOptions, HeightSurface, Isotropic, Metric, Modifiers, Smoothing,
+    Solver, Stop, Terrain,
 };
 
 fn shared(path: &str) -> PathBuf {
@@ -46,7 +47,7 @@ fn share(road: &[DVec2], route: &[DVec2]) -> f64 {
 }
 
 /// Mean share over the three roads.
-fn mean_share(surface: &HeightSurface, metric: &Metric, roads: &[Vec<DVec2>]) -> f64 {
+fn mean_share(surface: &HeightSurface, metric: &dyn Metric, roads: &[Vec<DVec2>]) -> f64 {
     let control = Control::default();
     let field = metric.on(surface, &Modifiers::default(), &Control::default()).unwrap();
     let shares = roads.iter().map(|road| {
@@ -70,9 +71,9 @@ fn curvature_routes_are_nearer_to_real_roads_than_geodesics() {
             if cells > 0.0 { Smoothing::CutoffCells(cells) } else { Smoothing::Interpolate };
         let options = FitOptions { smoothing, ..FitOptions::default() };
         let surface = HeightSurface::fit(&terrain, &options, &Control::default()).unwrap();
-        let isotropic = mean_share(&surface, &Metric::Isotropic, &roads);
+        let isotropic = mean_share(&surface, &Isotropic, &roads);
         let curvature = [0.03, 0.05, 0.1, 0.2, 0.4]
-            .map(|share| mean_share(&surface, &Metric::Curvature(Delta::Auto(share)), &roads));
+            .map(|share| mean_share(&surface, &Curvature { delta: Delta::Auto(share) }, &roads));
         println!("{cells} | {isotropic:.2} | {curvature:.2?}");
         if cells == FitOptions::DEFAULT_CUTOFF_CELLS {
             assert!(curvature[2] > isotropic + 0.15, "{} {isotropic}", curvature[2]);

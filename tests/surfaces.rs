@@ -3,28 +3,29 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use glam::{DVec2, DVec3, DVec4};
-use ridgeway::route::trace_on;
+use ridgeway::route::trace;
 use ridgeway::{
-    Accuracy, Control, Delta, DistanceMap, Knots, Metric, NurbsCurve, NurbsGrid, NurbsSurface,
-    ParametricSurface, Solver, StartRegion, Stop, SurfaceMetric,
+    Accuracy, Control, Curvature, Delta, DistanceMap, Isotropic, Knots, Metric, MetricField,
+    Modifiers, NurbsCurve, NurbsGrid, NurbsSurface, Solver, StartRegion, Stop, Surface,
 };
 
 const DELTA: f64 = 0.3;
 const RADIUS: f64 = 2.0;
 
-fn curvature(surface: &NurbsGrid) -> SurfaceMetric<'_> {
-    Metric::Curvature(Delta::Absolute(DELTA)).on_surface(surface, &Control::default()).unwrap()
+fn curvature(surface: &NurbsGrid) -> MetricField<'_> {
+    Curvature { delta: Delta::Absolute(DELTA) }
+        .on(surface, &Modifiers::default(), &Control::default())
+        .unwrap()
 }
 
 fn solve(
-    metric: &SurfaceMetric<'_>,
+    metric: &MetricField<'_>,
     start: impl Into<StartRegion>,
     accuracy: Accuracy,
 ) -> DistanceMap {
     let control = Control::default();
-    let field = metric.sample(&control).unwrap();
     let solver = Solver { accuracy, ..Solver::default() };
-    solver.solve_field(field, &[start.into()], &Stop::Never, &control).unwrap()
+    solver.solve(metric, &[start.into()], &Stop::Never, &control).unwrap()
 }
 
 /// Mean and greatest error over all nodes, as shares of the greatest distance.
@@ -160,7 +161,7 @@ fn a_torus_is_closed_both_ways_and_symmetric() {
     let torus = NurbsSurface::revolve(&profile, DVec3::ZERO, DVec3::Z).unwrap();
     assert_eq!(torus.closed(), [true, true]);
     let surface = torus.on_grid(160, 80).unwrap();
-    let metric = Metric::Isotropic.on_surface(&surface, &Control::default()).unwrap();
+    let metric = Isotropic.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
     let map = solve(&metric, DVec2::ZERO, Accuracy::Fast);
     let far = map.at_node(80, 40);
     for row in 0..80 {
@@ -190,7 +191,7 @@ fn a_torus_is_closed_both_ways_and_symmetric() {
 #[test]
 fn routes_are_great_circles_across_seams_and_poles() {
     let surface = sphere().on_grid(160, 81).unwrap();
-    let metric = Metric::Isotropic.on_surface(&surface, &Control::default()).unwrap();
+    let metric = Isotropic.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
     let start = DVec2::new(150.0, 20.0);
     let map = solve(&metric, start, Accuracy::Fast);
     // Over the seam, beside the pole, and almost exactly over it.
@@ -200,7 +201,7 @@ fn routes_are_great_circles_across_seams_and_poles() {
         DVec2::new(69.0, 12.3),
         DVec2::new(150.0, 70.0),
     ] {
-        let route = trace_on(&map, &metric, goal).unwrap();
+        let route = trace(&map, &metric, goal).unwrap();
         let (from, to) = (surface.space_jet(start).point, surface.space_jet(goal).point);
         assert!(
             route.points[0].distance(from) < 1e-9
@@ -209,11 +210,11 @@ fn routes_are_great_circles_across_seams_and_poles() {
         let exact = RADIUS * from.angle_between(to);
         let normal = from.cross(to).normalize();
         let stray = route.points.iter().map(|p| p.dot(normal).abs()).fold(0.0, f64::max);
-        println!("{goal}: {} for {exact}, {stray} m aside", route.cost);
-        assert!((route.cost / exact - 1.0).abs() < 2e-3 && stray < 0.05, "{goal}");
-        assert!((route.length_m - route.cost).abs() < 1e-9 * exact);
+        println!("{goal}: {} for {exact}, {stray} m aside", route.summary.cost);
+        assert!((route.summary.cost / exact - 1.0).abs() < 2e-3 && stray < 0.05, "{goal}");
+        assert!((route.summary.length_m - route.summary.cost).abs() < 1e-9 * exact);
     }
-    assert!(trace_on(&map, &metric, DVec2::new(3.0, 200.0)).is_err());
+    assert!(trace(&map, &metric, DVec2::new(3.0, 200.0)).is_err());
 }
 
 #[test]
@@ -222,10 +223,13 @@ fn threads_change_no_bit() {
     let of = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let metric = Metric::Curvature(Delta::default())
-                .on_surface(&surface, &Control::default())
+            let metric = Curvature::default()
+                .on(&surface, &Modifiers::default(), &Control::default())
                 .unwrap();
-            (metric.delta(), solve(&metric, DVec2::new(10.2, 20.3), Accuracy::High).to_row_major())
+            (
+                metric.parameter("delta_per_m"),
+                solve(&metric, DVec2::new(10.2, 20.3), Accuracy::High).to_row_major(),
+            )
         })
     };
     assert!(of(1) == of(2) && of(1) == of(4));

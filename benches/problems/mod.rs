@@ -12,8 +12,8 @@ use std::str::FromStr;
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
 use ridgeway::{
-    Accuracy, Control, Crs, Delta, FitOptions, GridFrame, Ground, HeightJet, HeightSurface, Metric,
-    Modifiers, Result, Smoothing, Solver, StartRegion, Sym2, Terrain,
+    Accuracy, Control, Crs, Curvature, Delta, FitOptions, GridFrame, Ground, HeightJet,
+    HeightSurface, Metric, Modifiers, Result, Smoothing, Solver, StartRegion, Sym2, Terrain,
 };
 
 /// Names of the accuracies there are, the best last, see [`solver`].
@@ -222,7 +222,7 @@ fn fitted(n: usize, height: impl Fn(DVec2) -> f64, control: &Control) -> Result<
     let terrain = Terrain::new(frame, heights, Crs::none())?;
     let options = FitOptions { smoothing: Smoothing::Interpolate, ..FitOptions::default() };
     let surface = HeightSurface::fit(&terrain, &options, control)?;
-    let metric = Metric::Curvature(Delta::Absolute(DELTA)).on(
+    let metric = Curvature { delta: Delta::Absolute(DELTA) }.on(
         &surface,
         &Modifiers::default(),
         &Control::default(),

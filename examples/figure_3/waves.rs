@@ -3,8 +3,8 @@
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
 use ridgeway::{
-    Control, Crs, Delta, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric, Modifiers,
-    Smoothing, Terrain,
+    Control, Crs, Curvature, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric,
+    Modifiers, Smoothing, Terrain,
 };
 
 pub(crate) const SIDE: usize = 121;
@@ -31,10 +31,6 @@ pub(crate) fn surface(terrain: &Terrain) -> Result<HeightSurface, Error> {
 }
 
 pub(crate) fn field(surface: &HeightSurface) -> Result<TensorField, Error> {
-    let metric = Metric::Curvature(Delta::default()).on(
-        surface,
-        &Modifiers::default(),
-        &Control::default(),
-    )?;
+    let metric = Curvature::default().on(surface, &Modifiers::default(), &Control::default())?;
     TensorField::sample(&metric, &Control::default())
 }

@@ -5,7 +5,8 @@ use ridgeway::eikonal::TensorField;
 use ridgeway::region::{SegmentOptions, Segmentation, gaussian_ranks};
 use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
-    Control, Crs, Delta, Error, FitOptions, HeightSurface, Metric, Modifiers, Smoothing, Terrain,
+    Control, Crs, Curvature, Error, FitOptions, HeightSurface, Metric, Modifiers, Smoothing,
+    Terrain,
 };
 
 /// Nodes along each side, as in the paper. Even, so that no node lies on the lines where the bumps meet.
@@ -42,11 +43,7 @@ pub(crate) fn segmentation(
     seed: u64,
 ) -> Result<Segmentation, Error> {
     let control = Control::default();
-    let metric = Metric::Curvature(Delta::default()).on(
-        surface,
-        &Modifiers::default(),
-        &Control::default(),
-    )?;
+    let metric = Curvature::default().on(surface, &Modifiers::default(), &Control::default())?;
     let field = TensorField::sample(&metric, &control)?;
     let ranks = perturbed(&gaussian_ranks(surface), perturbation, seed);
     Segmentation::of(&field, &ranks, &SegmentOptions::default(), &control)

@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 use ridgeway::{
-    Comparison, Control, Crs, Error, FitOptions, GridFrame, Ground, HeightSurface, Metric,
-    Modifiers, Smoothing, Solver, Terrain,
+    Comparison, Control, Crs, Curvature, Error, FitOptions, GridFrame, Ground, HeightSurface,
+    Isotropic, Metric, Modifiers, Smoothing, Solver, Terrain,
 };
 
 /// Nodes across and down, 1 m apart.
@@ -56,8 +56,8 @@ pub(crate) fn routes(terrain: &Terrain) -> Result<Comparison, Error> {
     let surface = HeightSurface::fit(terrain, &options, &control)?;
     let none = Modifiers::default();
     let metrics = [
-        Metric::Isotropic.on(&surface, &none, &Control::default())?,
-        Metric::Curvature(Default::default()).on(&surface, &none, &Control::default())?,
+        Isotropic.on(&surface, &none, &Control::default())?,
+        Curvature::default().on(&surface, &none, &Control::default())?,
     ];
     let [start, goal] = [START, GOAL].map(|at| terrain.frame().to_grid(at));
     Comparison::between(Solver::default(), &metrics, &[start.into()], goal, &control)

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 use ridgeway::{
-    Control, DistanceMap, Metric, ParametricSurface, Result, Solver, StartRegion, Stop, SurfaceJet,
+    Control, DistanceMap, Jet, Metric, Modifiers, Result, Solver, StartRegion, Stop, Surface,
+    SurfaceJet,
 };
 
 /// Radii of the arch and of the trough that it goes over into, with one tangent plane along the seam.
@@ -39,7 +40,7 @@ impl HalfCylinders {
     }
 }
 
-impl ParametricSurface for HalfCylinders {
+impl Surface for HalfCylinders {
     fn cols(&self) -> usize {
         self.nodes
     }
@@ -48,7 +49,7 @@ impl ParametricSurface for HalfCylinders {
         self.nodes
     }
 
-    fn space_jet(&self, at: DVec2) -> SurfaceJet {
+    fn jet(&self, at: DVec2) -> Jet {
         let step = 1.0 / self.grid(1.0, 1.0);
         let (arc, [first, second]) = (at.x * step.x, RADII);
         // Radius, length since the half began, centre, and whether it bends up.
@@ -59,20 +60,20 @@ impl ParametricSurface for HalfCylinders {
         };
         let (sin, cos) = (along / radius).sin_cos();
         let outward = DVec3::new(-cos, 0.0, up * sin);
-        SurfaceJet {
+        Jet::Space(SurfaceJet {
             point: DVec3::new(centre, at.y * step.y, 0.0) + outward * radius,
             first: [DVec3::new(sin, 0.0, up * cos) * step.x, DVec3::Y * step.y],
             second: [outward * -(step.x * step.x / radius), DVec3::ZERO, DVec3::ZERO],
-        }
+        })
     }
 }
 
 /// Which half each node falls to, and the share of the nodes that fall to their own.
-pub(crate) fn divide(surface: &HalfCylinders, metric: &Metric) -> Result<(Vec<bool>, f64)> {
+pub(crate) fn divide(surface: &HalfCylinders, metric: &dyn Metric) -> Result<(Vec<bool>, f64)> {
     let control = Control::default();
-    let field = metric.on_surface(surface, &control)?.sample(&control)?;
+    let metric = metric.on(surface, &Modifiers::default(), &control)?;
     let seeds = surface.seeds().map(StartRegion::from);
-    let map: DistanceMap = Solver::default().solve_field(field, &seeds, &Stop::Never, &control)?;
+    let map: DistanceMap = Solver::default().solve(&metric, &seeds, &Stop::Never, &control)?;
     let second: Vec<bool> = map.labels().iter().map(|&label| label == Some(1)).collect();
     let right = (0..).zip(&second).filter(|(i, second)| {
         let col = i % surface.nodes;

@@ -1,7 +1,7 @@
 //! Figure 5: one surface with two parametrisations.
 
 use glam::DVec2;
-use ridgeway::{Control, DistanceMap, Metric, NurbsGrid, Result, Solver, Stop};
+use ridgeway::{Control, DistanceMap, Metric, Modifiers, NurbsGrid, Result, Solver, Stop};
 
 use super::shapes::knight;
 
@@ -18,7 +18,7 @@ pub(crate) struct Comparison {
 }
 
 /// Distances with `2 n` nodes around and `n + 1` along the profile.
-pub(crate) fn compare(metric: &Metric, n: usize) -> Result<Comparison> {
+pub(crate) fn compare(metric: &dyn Metric, n: usize) -> Result<Comparison> {
     let (cols, rows) = (2 * n, n + 1);
     let knight = knight()?;
     let surfaces =
@@ -27,8 +27,8 @@ pub(crate) fn compare(metric: &Metric, n: usize) -> Result<Comparison> {
     let start = DVec2::new(0.3 * cols as f64, 0.35 * n as f64);
     let solve = |surface: &NurbsGrid, start: DVec2| {
         let control = Control::default();
-        let field = metric.on_surface(surface, &control)?.sample(&control)?;
-        Solver::default().solve_field(field, &[start.into()], &Stop::Never, &control)
+        let metric = metric.on(surface, &Modifiers::default(), &control)?;
+        Solver::default().solve(&metric, &[start.into()], &Stop::Never, &control)
     };
     let maps = [solve(&surfaces[0], start)?, solve(&surfaces[1], twin(start, n))?];
 

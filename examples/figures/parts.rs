@@ -1,14 +1,15 @@
 //! Surfaces with like parts, cut into regions: figures 7 and 9.
 
 use glam::{DVec2, DVec3};
+use ridgeway::eikonal::TensorField;
 use ridgeway::metric::{Difference, Metric};
 use ridgeway::region::{
     Neighbours, SegmentOptions, Segmentation, Signature, gaussian_ranks, signatures,
 };
 use ridgeway::synthetic::{Synthetic, SyntheticKind};
 use ridgeway::{
-    Control, Crs, Delta, FitOptions, HeightSurface, NurbsCurve, NurbsGrid, NurbsSurface,
-    ParametricSurface, Result, Smoothing, Solver, StartRegion, Stop,
+    Control, Crs, Curvature, FitOptions, HeightSurface, Modifiers, NurbsCurve, NurbsGrid,
+    NurbsSurface, Result, Smoothing, Solver, StartRegion, Stop, Surface,
 };
 
 use super::shapes::knight;
@@ -16,7 +17,7 @@ use super::shapes::knight;
 /// A surface cut into regions.
 pub(crate) struct Cut {
     pub(crate) name: &'static str,
-    pub(crate) surface: Box<dyn ParametricSurface>,
+    pub(crate) surface: Box<dyn Surface>,
     pub(crate) labels: Vec<Option<u32>>,
     pub(crate) signatures: Vec<Signature>,
 }
@@ -24,7 +25,7 @@ pub(crate) struct Cut {
 impl Cut {
     fn new(
         name: &'static str,
-        surface: Box<dyn ParametricSurface>,
+        surface: Box<dyn Surface>,
         labels: Vec<Option<u32>>,
     ) -> Result<Self> {
         let signatures = signatures(&*surface, &labels, Neighbours::Surface, &Control::default())?;
@@ -47,9 +48,8 @@ pub(crate) fn nearest_rings(surface: &NurbsGrid, rows: &[f64]) -> Result<Vec<Opt
         StartRegion { lines: vec![vec![from, from + last]], ..StartRegion::default() }
     };
     let starts: Vec<_> = rows.iter().map(ring).collect();
-    let metric = Metric::Difference(Difference::default());
-    let field = metric.on_surface(surface, &control)?.sample(&control)?;
-    Ok(Solver::default().solve_field(field, &starts, &Stop::Never, &control)?.labels())
+    let metric = Difference::default().on(surface, &Modifiers::default(), &control)?;
+    Ok(Solver::default().solve(&metric, &starts, &Stop::Never, &control)?.labels())
 }
 
 /// Two surfaces with like parts, and the names of the parts of each.
@@ -128,8 +128,8 @@ pub(crate) fn bumps() -> Result<Cut> {
     let options = FitOptions { smoothing: Smoothing::Interpolate, ..FitOptions::default() };
     let surface = HeightSurface::fit(&terrain, &options, &Control::default())?;
     let control = Control::default();
-    let field =
-        Metric::Curvature(Delta::default()).on_surface(&surface, &control)?.sample(&control)?;
+    let metric = Curvature::default().on(&surface, &Modifiers::default(), &control)?;
+    let field = TensorField::sample(&metric, &control)?;
     let options = SegmentOptions::default();
     let cut = Segmentation::of(&field, &gaussian_ranks(&surface), &options, &control)?;
     Cut::new("bumps", Box::new(surface), cut.levels[0].labels.clone())

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use glam::DVec2;
-use ridgeway::metric::{Difference, DifferenceForm};
+use ridgeway::metric::{MetricOptions, NAMED, NamedMetric};
 use ridgeway::region::SegmentOptions;
 use ridgeway::{Accuracy, Degree, Delta, Error, FitOptions, Metric, Smoothing, Solver, Sym2};
 
@@ -169,8 +170,8 @@ pub(crate) struct DistanceArgs {
     #[arg(long, value_name = "PLACE", allow_hyphen_values = true)]
     pub(crate) goal: Vec<Place>,
     /// The metric [default: curvature, or tensor with --tensor].
-    #[arg(long, value_enum, value_name = "METRIC")]
-    pub(crate) metric: Option<MetricName>,
+    #[arg(long, value_parser = metric(), value_name = "METRIC")]
+    pub(crate) metric: Option<NamedMetric>,
     /// The GeoTIFF to write; cells that cannot be reached are nodata.
     #[arg(short, long, value_name = "FILE.tif")]
     pub(crate) output: Option<PathBuf>,
@@ -218,8 +219,8 @@ pub(crate) struct RouteArgs {
     #[arg(long, value_name = "PLACE", required = true, allow_hyphen_values = true)]
     pub(crate) goal: Vec<Place>,
     /// The metric [default: curvature, or tensor with --tensor].
-    #[arg(long, value_enum, value_name = "METRIC")]
-    pub(crate) metric: Option<MetricName>,
+    #[arg(long, value_parser = metric(), value_name = "METRIC")]
+    pub(crate) metric: Option<NamedMetric>,
     /// The file to write: .geojson, .gpx or .csv (a profile); may be given several times.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Vec<PathBuf>,
@@ -246,8 +247,8 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "PLACE", allow_hyphen_values = true)]
     pub(crate) goal: Place,
     /// The metrics [default: isotropic,curvature,difference, and tensor with --tensor].
-    #[arg(long, value_enum, value_name = "METRIC", value_delimiter = ',')]
-    pub(crate) metrics: Vec<MetricName>,
+    #[arg(long, value_parser = metric(), value_name = "METRIC", value_delimiter = ',')]
+    pub(crate) metrics: Vec<NamedMetric>,
     /// The folder to write: routes.geojson, profile.csv, summary.json, map.png.
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
@@ -272,8 +273,8 @@ pub(crate) struct SegmentArgs {
     /// The DEM.
     pub(crate) dem: PathBuf,
     /// The metric [default: curvature, or tensor with --tensor].
-    #[arg(long, value_enum, value_name = "METRIC")]
-    pub(crate) metric: Option<MetricName>,
+    #[arg(long, value_parser = metric(), value_name = "METRIC")]
+    pub(crate) metric: Option<NamedMetric>,
     /// The file to write: .geojson (polygons with statistics), .tif (number of each cell's region, a band per level; 0 for
     /// none) or .png (map); may be given several times.
     #[arg(short, long, value_name = "FILE")]
@@ -301,8 +302,8 @@ pub(crate) struct MatchArgs {
     #[arg(required = true, num_args = 1..=2, value_name = "SURFACE")]
     pub(crate) surfaces: Vec<PathBuf>,
     /// The metric of the regions [default: curvature, or tensor with --tensor].
-    #[arg(long, value_enum, value_name = "METRIC")]
-    pub(crate) metric: Option<MetricName>,
+    #[arg(long, value_parser = metric(), value_name = "METRIC")]
+    pub(crate) metric: Option<NamedMetric>,
     /// Let sizes count beside shapes.
     #[arg(long)]
     pub(crate) sized: bool,
@@ -349,8 +350,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "PLACE", requires = "start", allow_hyphen_values = true)]
     pub(crate) goal: Vec<Place>,
     /// The metric of the routes [default: curvature, or tensor with --tensor].
-    #[arg(long, value_enum, value_name = "METRIC")]
-    pub(crate) metric: Option<MetricName>,
+    #[arg(long, value_parser = metric(), value_name = "METRIC")]
+    pub(crate) metric: Option<NamedMetric>,
     #[command(flatten)]
     pub(crate) ground: GroundArgs,
 }
@@ -492,21 +493,21 @@ impl MetricArgs {
     ///
     /// # Errors
     /// As [`check_tensor`](Self::check_tensor).
-    pub(crate) fn chosen(&self, asked: Option<MetricName>) -> Result<MetricName, Error> {
-        let name = asked.unwrap_or(self.default_name());
-        self.check_tensor(&[name])?;
-        Ok(name)
+    pub(crate) fn chosen(&self, asked: Option<NamedMetric>) -> Result<NamedMetric, Error> {
+        let metric = asked.unwrap_or(self.default_metric());
+        self.check_tensor(&[metric])?;
+        Ok(metric)
     }
 
     /// The metric that a user who names none wants.
-    pub(crate) fn default_name(&self) -> MetricName {
-        if self.tensor.is_some() { MetricName::Tensor } else { MetricName::Curvature }
+    pub(crate) fn default_metric(&self) -> NamedMetric {
+        known(if self.tensor.is_some() { TENSOR } else { CURVATURE })
     }
 
     /// # Errors
     /// `--tensor` beside metrics that do not look at it.
-    pub(crate) fn check_tensor(&self, names: &[MetricName]) -> Result<(), Error> {
-        if self.tensor.is_some() && !names.contains(&MetricName::Tensor) {
+    pub(crate) fn check_tensor(&self, metrics: &[NamedMetric]) -> Result<(), Error> {
+        if self.tensor.is_some() && !metrics.iter().any(|metric| metric.name == TENSOR) {
             return Err(Error::usage(
                 "--tensor is used by the metric `tensor` alone, which is not asked for; name it, or leave --tensor out",
             ));
@@ -520,27 +521,17 @@ impl MetricArgs {
     /// `tensor` without tensors.
     pub(crate) fn metric(
         &self,
-        name: MetricName,
+        metric: NamedMetric,
         tensors: Option<&Arc<[Sym2]>>,
-    ) -> Result<Metric, Error> {
-        let difference = |form| {
-            let default = Difference::default();
-            Metric::Difference(Difference {
-                form,
-                curvature_delta: self.delta.unwrap_or(default.curvature_delta),
-                delta: self.difference_delta.unwrap_or(default.delta),
-            })
-        };
-        match (name, tensors) {
-            (MetricName::Isotropic, _) => Ok(Metric::Isotropic),
-            (MetricName::Curvature, _) => Ok(Metric::Curvature(self.delta.unwrap_or_default())),
-            (MetricName::Difference, _) => Ok(difference(DifferenceForm::Rate)),
-            (MetricName::DifferenceLiteral, _) => Ok(difference(DifferenceForm::Literal)),
-            (MetricName::Tensor, Some(tensors)) => Ok(Metric::Tensor(Arc::clone(tensors))),
-            (MetricName::Tensor, None) => {
-                Err(Error::usage("the metric `tensor` needs --tensor FILE.tif"))
-            }
+    ) -> Result<Box<dyn Metric>, Error> {
+        if metric.name == TENSOR && tensors.is_none() {
+            return Err(Error::usage("the metric `tensor` needs --tensor FILE.tif"));
         }
+        metric.with(&MetricOptions {
+            delta: self.delta,
+            difference_delta: self.difference_delta,
+            tensors: tensors.cloned(),
+        })
     }
 
     /// The first flag given that only a DEM can have.
@@ -573,18 +564,20 @@ impl AccuracyName {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MetricName {
-    /// Length on the surface, in metres.
-    Isotropic,
-    /// The curvature tensor, in AG units.
-    Curvature,
-    /// The rate at which the curvature tensor changes, in AG units.
-    Difference,
-    /// The same from cell to cell, as the paper prints it: depends on the cell size and the grid's directions.
-    DifferenceLiteral,
-    /// The tensors of --tensor, in AG units.
-    Tensor,
+/// The metric of `--tensor`.
+pub(crate) const TENSOR: &str = "tensor";
+/// The metric of a user who names none.
+pub(crate) const CURVATURE: &str = "curvature";
+
+/// The metric of a name that is known to be one.
+pub(crate) fn known(name: &str) -> NamedMetric {
+    NamedMetric::find(name).expect("the library has it")
+}
+
+/// Takes the name of a metric.
+fn metric() -> impl TypedValueParser<Value = NamedMetric> {
+    let names = NAMED.map(|metric| PossibleValue::new(metric.name).help(metric.about));
+    PossibleValuesParser::new(names).map(|name| known(&name))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use ridgeway::metric::NamedMetric;
 use ridgeway::terrain::{Georeference, read_bands};
 use ridgeway::{
     Control, DistanceMap, Error, GridFrame, HeightSurface, Metric, MetricField, Modifiers, Result,
@@ -10,7 +11,7 @@ use ridgeway::{
 };
 use serde_json::{Value, json};
 
-use crate::args::{FitArgs, GroundArgs, MetricName, RunArgs};
+use crate::args::{FitArgs, GroundArgs, RunArgs, TENSOR};
 use crate::cover::cover;
 use crate::places::{self, Place, Spot, cell};
 use crate::report::{self, digits};
@@ -83,52 +84,48 @@ impl<'a> Journey<'a> {
     ///
     /// # Errors
     /// `tensor` without `--tensor`.
-    pub(crate) fn metric(&self, name: MetricName) -> Result<Metric> {
-        self.args.metric.metric(name, self.tensors.as_ref())
+    pub(crate) fn metric(&self, metric: NamedMetric) -> Result<Box<dyn Metric>> {
+        self.args.metric.metric(metric, self.tensors.as_ref())
     }
 
     /// The metric of this name on the surface.
     ///
     /// # Errors
     /// `tensor` without `--tensor`; a start or goal where the metric lets nobody enter; cancelled.
-    pub(crate) fn field(&self, name: MetricName, control: &Control) -> Result<MetricField<'_>> {
+    pub(crate) fn field(&self, metric: NamedMetric, control: &Control) -> Result<MetricField<'_>> {
         let modifiers = Modifiers {
             climb_weight: self.args.metric.climb_weight,
             max_slope_deg: self.args.metric.max_slope,
             barrier: self.barrier.clone(),
             cost: self.cost.clone(),
         };
-        let field = self.metric(name)?.on(&self.surface, &modifiers, control)?;
+        let field = self.metric(metric)?.on(&self.surface, &modifiers, control)?;
         for spot in self.starts.iter().chain(&self.goals) {
-            let why = match (name, self.args.metric.max_slope) {
+            let why = match (metric.name, self.args.metric.max_slope) {
                 _ if self.cost.is_some() => {
                     "lies where the metric lets nobody enter: --cost or --tensor has no \
                      value there, or the ground is steeper than --max-slope allows"
                 }
-                (MetricName::Tensor, Some(_)) => {
+                (TENSOR, Some(_)) => {
                     "lies where --tensor has no value or the ground is steeper than --max-slope allows"
                 }
                 (_, Some(_)) => "lies on ground steeper than --max-slope allows",
-                (MetricName::Tensor, None) => "lies where --tensor has no value",
+                (TENSOR, None) => "lies where --tensor has no value",
                 (_, None) => "lies where the metric is too extreme to compute with",
             };
             spot.check(&self.georeference, |col, row| field.is_open(col, row), why)?;
         }
-        self.note_climb_weight(name, &field);
+        self.note_climb_weight(&field);
         Ok(field)
     }
 
     /// Says so where the climb weight makes the metric more anisotropic than the grid can follow.
-    fn note_climb_weight(&self, name: MetricName, field: &MetricField<'_>) {
-        /// A grade of 60 % is then 19 times as dear as level ground. Across Andorra (75 m cells) the distance is 9 % too short at 1800,
+    fn note_climb_weight(&self, field: &MetricField<'_>) {
+        /// A grade of 60 % is then 19 times as costly as level ground. Across Andorra (75 m cells) the distance is 9 % too short at 1800,
         /// 36 % at 6000.
         const LARGEST: f64 = 1000.0;
         let weight = self.args.metric.climb_weight;
-        let level = match name {
-            MetricName::Isotropic => Some(1.0),
-            _ => field.difference_delta().or(field.delta()),
-        };
-        if let Some(level) = level
+        if let Some(level) = field.level()
             && weight > LARGEST * level
             && !self.quiet
         {
@@ -188,17 +185,7 @@ impl<'a> Journey<'a> {
         let metric = &self.args.metric;
         let name =
             |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let metrics: Vec<_> = fields
-            .iter()
-            .map(|f| {
-                json!({
-                    "name": f.name(),
-                    "unit": f.unit(),
-                    "delta_per_m": f.delta(),
-                    "difference_delta": f.difference_delta(),
-                })
-            })
-            .collect();
+        let metrics: Vec<_> = fields.iter().map(report::metric).collect();
         json!({
             "metrics": metrics,
             "software": format!("ridgeway {}", env!("CARGO_PKG_VERSION")),

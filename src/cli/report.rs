@@ -4,8 +4,8 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 pub(crate) use ridgeway::export::digits;
-use ridgeway::{Error, Result, Terrain};
-use serde_json::Value;
+use ridgeway::{Error, MetricField, Result, Terrain, Unit};
+use serde_json::{Value, json};
 
 use crate::args::RunArgs;
 
@@ -64,6 +64,20 @@ pub(crate) fn print(text: &str) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Name, unit and parameters of a metric.
+pub(crate) fn metric(field: &MetricField<'_>) -> Value {
+    let mut metric = json!({
+        "name": field.name(),
+        "unit": field.unit(),
+        "delta_per_m": null,
+        "difference_delta": null,
+    });
+    for parameter in field.parameters() {
+        metric[parameter.name] = parameter.value.into();
+    }
+    metric
 }
 
 /// Tells on standard error what the reader of the DEM noticed.
@@ -146,9 +160,9 @@ pub(crate) fn metres(value: f64) -> String {
 }
 
 /// A distance with its unit.
-pub(crate) fn distance(value: f64, unit: &str) -> String {
+pub(crate) fn distance(value: f64, unit: Unit) -> String {
     match unit {
-        "m" => metres(value),
+        Unit::Metres => metres(value),
         _ => format!("{} {unit}", digits(value)),
     }
 }
@@ -181,7 +195,7 @@ mod tests {
         assert_eq!(metres(823.4), "823 m");
         assert_eq!(metres(0.007_108), "0.007108 m");
         assert_eq!(metres(-2.7e-13), "0 m");
-        assert_eq!(distance(823.4, "AG units"), "823.4 AG units");
+        assert_eq!(distance(823.4, Unit::Ag), "823.4 AG units");
     }
 
     #[test]

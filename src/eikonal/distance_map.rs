@@ -11,6 +11,7 @@ use super::stencil::UNREACHED;
 use super::tensor_field::{TensorField, TensorTile};
 use super::tile::Limits;
 use crate::grid::tiling::AREA;
+use crate::metric::Unit;
 
 /// Distance from the nearest start region at every node.
 #[derive(Clone, Debug)]
@@ -40,9 +41,9 @@ impl DistanceMap {
         self.field.rows()
     }
 
-    /// Unit of the values: `m` or `AG units`; empty for a bare tensor field.
+    /// Unit of the values; unknown for a bare tensor field.
     #[must_use]
-    pub fn unit(&self) -> &'static str {
+    pub fn unit(&self) -> Unit {
         self.field.unit()
     }
 

@@ -11,8 +11,8 @@ use crate::grid::GridFrame;
 use crate::grid::tiling::{AREA, SIDE, Tiling};
 use crate::linalg::Sym2;
 use crate::linalg::simd::{self, Kernel};
-use crate::metric::MetricField;
 use crate::metric::SpeedBlock;
+use crate::metric::{MetricField, Unit};
 use crate::surface::BLOCK;
 
 const _: () = assert!(SIDE == BLOCK, "a tile is filled from one block of speeds");
@@ -42,30 +42,32 @@ pub struct TensorField {
     /// Mean over the open nodes of the length of a cell, `det(D)^(−1/4)`, in stored units.
     pub(super) mean_step: f32,
     /// Unit of the distance, and where the nodes lie on the ground, if that is known.
-    unit: &'static str,
+    unit: Unit,
     frame: Option<GridFrame>,
 }
 
 impl TensorField {
-    /// Samples a metric at the nodes of its surface. Nodes within metres of a pole, where cells have no width, are closed.
+    /// Samples a metric at the nodes of its surface, periodic where that is. Nodes within metres of a pole, where cells have no width, are closed.
     ///
     /// # Errors
-    /// [`Error::Usage`] if a tensor is too far from what is typical, as in [`set`](Self::set); cancelled.
+    /// [`Error::Usage`] if the metric has no quadratic form, a closed direction fewer than 3 nodes, or a tensor is too far from
+    /// what is typical, as in [`set`](Self::set); cancelled.
     pub fn sample(metric: &MetricField<'_>, control: &Control) -> Result<Self> {
-        let frame = metric.surface().frame();
-        // Columns run east, rows run south, one node per step.
-        let stretch: Vec<_> = (0..frame.rows())
-            .map(|row| frame.spacing(row as f64).recip() * DVec2::new(1.0, -1.0))
-            .collect();
-        let widest = NO_WIDTH / frame.mid_spacing().x;
+        metric.check_quadratic()?;
+        let surface = metric.surface();
+        // One node per step.
+        let stretch: Vec<_> =
+            (0..surface.rows()).map(|row| surface.axes(row as f64).recip()).collect();
+        let widest = surface.frame().map_or(f64::INFINITY, |map| NO_WIDTH / map.mid_spacing().x);
         let sample = |col, row: usize, speeds: &mut SpeedBlock| {
             metric.block_speeds(col, row, speeds);
             for (det, by) in speeds.det.iter_mut().zip(&stretch[row..]) {
                 *det = if by.x < widest { *det } else { Default::default() };
             }
         };
-        let field = Self::build(frame.cols(), frame.rows(), &stretch, sample, control)?;
-        Ok(Self { unit: metric.unit(), frame: Some(frame.clone()), ..field })
+        let field = Self::build(surface.cols(), surface.rows(), &stretch, sample, control)?;
+        let field = field.periodic(surface.periodic())?;
+        Ok(Self { unit: metric.unit(), frame: surface.frame().cloned(), ..field })
     }
 
     /// The field of a function of `(column, row)` in index coordinates; `None`, or a tensor that is not positive definite, for a
@@ -84,7 +86,7 @@ impl TensorField {
             for j in 0..SIDE.min(rows - row) {
                 for i in 0..SIDE.min(cols - col) {
                     if let Some(d) = tensor(col + i, row + j) {
-                        speeds.set(j, i, (d, d.det()));
+                        speeds.set(j, i, d);
                     }
                 }
             }
@@ -188,12 +190,12 @@ impl TensorField {
         });
         let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
         let mean_step = mean_step as f32;
-        Ok(Self { tiling, tiles, root_scale, mean_step, unit: "", frame: None })
+        Ok(Self { tiling, tiles, root_scale, mean_step, unit: Unit::Unknown, frame: None })
     }
 
     /// Unit of the distance; empty if it is not known.
     #[must_use]
-    pub fn unit(&self) -> &'static str {
+    pub fn unit(&self) -> Unit {
         self.unit
     }
 
@@ -379,21 +381,22 @@ mod tests {
 
     use super::*;
     use crate::grid::{GridFrame, Ground};
-    use crate::metric::{Metric, Modifiers};
+    use crate::metric::{Curvature, Difference, Isotropic, Metric, Modifiers, Tensor};
     use crate::surface::{FitOptions, HeightSurface};
     use crate::synthetic::{Synthetic, SyntheticKind};
     use crate::terrain::{Crs, Terrain};
 
     /// The stored tensors of a metric against those at single points; the largest relative difference.
     fn difference(metric: &MetricField<'_>) -> f64 {
-        let frame = metric.surface().frame();
+        let frame = metric.surface().frame().unwrap();
         let field = TensorField::sample(metric, &Control::default()).unwrap();
         let mut largest = 0.0_f64;
         for (col, row) in (0..frame.nodes()).map(|i| (i % frame.cols(), i / frame.cols())) {
             assert_eq!(field.is_open(col, row), metric.is_open(col, row));
             if metric.is_open(col, row) {
                 let by = frame.spacing(row as f64) * DVec2::new(1.0, -1.0) * field.root_scale();
-                let d = metric.speed(DVec2::new(col as f64, row as f64)).stretched(by.recip());
+                let d =
+                    metric.speed(DVec2::new(col as f64, row as f64)).unwrap().stretched(by.recip());
                 let (tile, i) = field.tiling.place(col, row);
                 let tile = field.tensors(tile);
                 let [xx, xy, det] = [tile.xx[i], tile.xy[i], tile.det[i]].map(f64::from);
@@ -437,7 +440,7 @@ mod tests {
         let terrain = Terrain::new(frame, vec![0.0; 36 * 19], Crs::none()).unwrap();
         let control = Control::default();
         let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
-        let metric = Metric::Isotropic.on(&surface, &Modifiers::default(), &control).unwrap();
+        let metric = Isotropic.on(&surface, &Modifiers::default(), &control).unwrap();
         let field = TensorField::sample(&metric, &control).unwrap();
         let open = [0, 1, 17, 18].map(|row| field.is_open(5, row));
         assert_eq!(open, [false, true, true, false]);
@@ -459,12 +462,13 @@ mod tests {
                     HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default())
                         .unwrap();
                 let tensors: Arc<[Sym2]> = (0..53 * 37).map(tensor).collect();
-                for metric in [
-                    Metric::Isotropic,
-                    Metric::Curvature(Default::default()),
-                    Metric::Difference(Default::default()),
-                    Metric::Tensor(tensors),
-                ] {
+                let metrics: [&dyn Metric; 4] = [
+                    &Isotropic,
+                    &Curvature::default(),
+                    &Difference::default(),
+                    &Tensor { tensors },
+                ];
+                for metric in metrics {
                     for climb_weight in [0.0, 30.0] {
                         let cost = (0..53 * 37).map(|i| 1.5 + (i as f32).cos()).collect();
                         let cost = (climb_weight > 0.0).then_some(cost);

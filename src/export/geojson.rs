@@ -244,6 +244,7 @@ pub(super) mod tests {
     use super::*;
     use crate::error::Error;
     use crate::grid::Ground;
+    use crate::metric::Unit;
     use crate::route::Summary;
 
     pub(in crate::export) fn route() -> Route {
@@ -252,10 +253,9 @@ pub(super) mod tests {
             points: vec![DVec3::new(2.0, 41.0, 100.0), DVec3::new(2.25, 41.5, 120.123)],
             summary: Summary {
                 metric: "isotropic".into(),
-                delta_per_m: None,
-                difference_delta: None,
+                parameters: Vec::new(),
                 cost: 1.0,
-                cost_unit: "m".into(),
+                cost_unit: Unit::Metres,
                 length_m: 10.0,
                 plan_length_m: 9.0,
                 climb_m: 20.0,

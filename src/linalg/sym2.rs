@@ -16,6 +16,9 @@ pub struct Sym2 {
 }
 
 impl Sym2 {
+    /// No matrix at all.
+    pub const NAN: Self = Self::new(f64::NAN, f64::NAN, f64::NAN);
+
     /// `[xx xy; xy yy]`.
     #[must_use]
     #[inline(always)]

@@ -1,15 +1,12 @@
 //! Speed tensors of many nodes at once.
 
-use multiversion::multiversion;
-
-use super::{Speed, averse_to_climb, curvature};
 use crate::linalg::Sym2;
 use crate::surface::{BLOCK, JetBlock, Lanes};
 
-/// Speed tensors at the nodes of a block in ground axes, row by row: `D` and its determinant side by side. A
-/// determinant of 0 marks a closed node, whose other entries mean nothing.
+/// Speed tensors at the nodes of a [`Block`](crate::surface::Block) in the axes of the surface, by row and column within it:
+/// `D` and its determinant side by side. A determinant of 0 marks a closed node, whose other entries mean nothing.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct SpeedBlock {
+pub struct SpeedBlock {
     pub(crate) xx: [Lanes; BLOCK],
     pub(crate) xy: [Lanes; BLOCK],
     pub(crate) yy: [Lanes; BLOCK],
@@ -19,65 +16,41 @@ pub(crate) struct SpeedBlock {
 }
 
 impl SpeedBlock {
-    /// Sets the tensor in column `i` of row `row`, and its determinant.
+    /// Gives the node in column `i` of row `j` a tensor; it is closed if that is not positive definite.
+    ///
+    /// # Panics
+    /// If `i` or `j` is not less than [`Block::SIDE`](crate::surface::Block::SIDE).
     #[inline(always)]
-    pub(crate) fn set(&mut self, row: usize, i: usize, (d, det): (Sym2, f64)) {
-        self.xx[row][i] = d.xx;
-        self.xy[row][i] = d.xy;
-        self.yy[row][i] = d.yy;
-        self.det[row][i] = det;
+    pub fn set(&mut self, j: usize, i: usize, d: Sym2) {
+        self.set_with(j, i, (d, d.det()));
     }
 
-    /// Whether the tensor in column `i` of row `row` is positive definite.
+    /// The same with a determinant that is known better than from the entries.
     #[inline(always)]
-    pub(crate) fn is_open(&self, row: usize, i: usize) -> bool {
-        let det = self.det[row][i];
-        (self.xx[row][i] > 0.0) & (det > 0.0) & (det < f64::INFINITY)
+    pub(crate) fn set_with(&mut self, j: usize, i: usize, (d, det): (Sym2, f64)) {
+        self.xx[j][i] = d.xx;
+        self.xy[j][i] = d.xy;
+        self.yy[j][i] = d.yy;
+        self.det[j][i] = det;
     }
 
-    /// Multiplies the tensor in column `i` of row `row` by `factor`.
-    pub(super) fn scale(&mut self, row: usize, i: usize, factor: f64) {
-        let (d, det) = self.get(row, i);
-        self.set(row, i, (d * factor, det * factor * factor));
-    }
-
+    /// Whether the tensor in column `i` of row `j` is positive definite.
     #[inline(always)]
-    fn get(&self, row: usize, i: usize) -> (Sym2, f64) {
-        (Sym2::new(self.xx[row][i], self.xy[row][i], self.yy[row][i]), self.det[row][i])
+    pub(crate) fn is_open(&self, j: usize, i: usize) -> bool {
+        let det = self.det[j][i];
+        (self.xx[j][i] > 0.0) & (det > 0.0) & (det < f64::INFINITY)
     }
-}
 
-/// The tensors of a metric at the nodes of a block; those known at the nodes are in `speeds` already.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-pub(super) fn of_jets(speed: &Speed, climb_weight: f64, speeds: &mut SpeedBlock) {
-    match *speed {
-        Speed::Isotropic => {
-            for row in 0..BLOCK {
-                for i in 0..BLOCK {
-                    speeds.set(row, i, curvature::isotropic(&speeds.jets.jet(row, i)));
-                }
-            }
-        }
-        Speed::Curvature { delta } => {
-            for row in 0..BLOCK {
-                for i in 0..BLOCK {
-                    speeds.set(row, i, curvature::curvature(&speeds.jets.jet(row, i), delta));
-                }
-            }
-        }
-        Speed::Difference { .. } | Speed::Tensor(_) => {}
+    /// Multiplies the tensor in column `i` of row `j` by `factor`.
+    pub(super) fn scale(&mut self, j: usize, i: usize, factor: f64) {
+        let (d, det) = self.get(j, i);
+        self.set_with(j, i, (d * factor, det * factor * factor));
     }
-    if climb_weight > 0.0 {
-        for row in 0..BLOCK {
-            for i in 0..BLOCK {
-                let speed = speeds.get(row, i);
-                speeds.set(row, i, averse_to_climb(speed, &speeds.jets.jet(row, i), climb_weight));
-            }
-        }
+
+    /// The tensor in column `i` of row `j` and its determinant.
+    #[inline(always)]
+    pub(super) fn get(&self, j: usize, i: usize) -> (Sym2, f64) {
+        (Sym2::new(self.xx[j][i], self.xy[j][i], self.yy[j][i]), self.det[j][i])
     }
 }
 
@@ -87,7 +60,8 @@ mod tests {
 
     use super::*;
     use crate::control::Control;
-    use crate::metric::{Metric, Modifiers};
+    use crate::metric::modifiers::averse_to_climb;
+    use crate::metric::{Curvature, Isotropic, Metric, Modifiers, curvature, isotropic};
     use crate::surface::{FitOptions, HeightSurface};
     use crate::synthetic::{Synthetic, SyntheticKind};
     use crate::terrain::Crs;
@@ -98,19 +72,21 @@ mod tests {
         let terrain = range.terrain(Crs::none(), DVec2::ZERO).unwrap();
         let surface =
             HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default()).unwrap();
-        for metric in [Metric::Isotropic, Metric::Curvature(Default::default())] {
+        let metrics: [&dyn Metric; 2] = [&Isotropic, &Curvature::default()];
+        for metric in metrics {
             let modifiers = Modifiers { climb_weight: 20.0, ..Modifiers::default() };
             let field = metric.on(&surface, &modifiers, &Control::default()).unwrap();
             let mut speeds = SpeedBlock::default();
             field.block_speeds(16, 16, &mut speeds);
             for row in 0..BLOCK {
                 for i in 0..BLOCK {
-                    let jet = speeds.jets.jet(row, i);
-                    let speed = match metric {
-                        Metric::Isotropic => curvature::isotropic(&jet),
-                        _ => curvature::curvature(&jet, field.delta().unwrap()),
+                    let jet = speeds.jets.heights().unwrap().jet(row, i);
+                    let speed = match field.parameter("delta_per_m") {
+                        None => isotropic::of_heights(&jet),
+                        Some(delta) => curvature::of_heights(&jet, delta),
                     };
-                    assert_eq!(averse_to_climb(speed, &jet, 20.0), speeds.get(row, i));
+                    let rise = jet.gradient();
+                    assert_eq!(averse_to_climb(speed, rise, 20.0), speeds.get(row, i));
                 }
             }
         }

@@ -1,16 +1,96 @@
 //! The curvature tensor CT of the paper, equation (4).
 
-use crate::linalg::Sym2;
-use crate::surface::Forms;
-use crate::surface::{HeightJet, SurfaceJet};
+use glam::DVec2;
 
-/// `G⁻¹`, the speed tensor of the geodesic distance, and its determinant.
-#[inline(always)]
-pub(super) fn isotropic(jet: &HeightJet) -> (Sym2, f64) {
-    let (zx, zy) = (jet.zx, jet.zy);
-    let inverse = 1.0 / (1.0 + zx * zx + zy * zy);
-    let d = Sym2::new((1.0 + zy * zy) * inverse, -zx * zy * inverse, (1.0 + zx * zx) * inverse);
-    (d, inverse)
+use super::{Delta, Metric, MetricOptions, NamedMetric, Norm, SpeedBlock, SpeedTensor, Unit};
+use crate::control::Control;
+use crate::error::Result;
+use crate::linalg::Sym2;
+use crate::linalg::simd::{self, Kernel};
+use crate::surface::{
+    BLOCK, Block, Forms, HeightBlock, HeightJet, Jet, JetBlock, Surface, SurfaceJet,
+};
+
+pub(super) const NAMED: NamedMetric = NamedMetric {
+    name: "curvature",
+    about: "The curvature tensor, in AG units",
+    make: |options: &MetricOptions| {
+        Ok(Box::new(Curvature { delta: options.delta.unwrap_or_default() }))
+    },
+};
+
+/// The curvature tensor CT, `D = Σ 1/(δ+|κ_i|) w_i w_iᵀ`: a step along a direction of high normal curvature is costly. An AG
+/// unit is `m·√(1/m)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Curvature {
+    /// The offset `δ`.
+    pub delta: Delta,
+}
+
+impl Metric for Curvature {
+    fn name(&self) -> &str {
+        NAMED.name
+    }
+
+    fn unit(&self) -> Unit {
+        Unit::Ag
+    }
+
+    fn norm(&self, surface: &dyn Surface, _: &Control) -> Result<Norm> {
+        let delta = self.delta.on(surface)?;
+        let norm = Norm::quadratic(CurvatureTensor { delta });
+        Ok(norm.with_parameter("delta_per_m", delta, "1/m").with_level(delta))
+    }
+}
+
+/// CT on a surface.
+#[derive(Clone, Copy, Debug)]
+struct CurvatureTensor {
+    /// 1/m.
+    delta: f64,
+}
+
+impl SpeedTensor for CurvatureTensor {
+    fn speed(&self, at: DVec2, jet: &Jet) -> Sym2 {
+        self.speed_and_det(at, jet).0
+    }
+
+    fn speed_and_det(&self, _: DVec2, jet: &Jet) -> (Sym2, f64) {
+        match jet {
+            Jet::Height(jet) => of_heights(jet, self.delta),
+            Jet::Space(jet) => {
+                let d = if jet.is_regular() { in_space(jet, self.delta) } else { Sym2::NAN };
+                (d, d.det())
+            }
+        }
+    }
+
+    fn block(&self, block: &Block, jets: &JetBlock, speeds: &mut SpeedBlock) {
+        match jets.heights() {
+            Some(jets) => simd::dispatch(BlockOfHeights { jets, delta: self.delta, speeds }),
+            None => super::one_by_one(self, block, jets, speeds),
+        }
+    }
+}
+
+/// The tensors of a block of heights.
+struct BlockOfHeights<'a> {
+    jets: &'a HeightBlock,
+    delta: f64,
+    speeds: &'a mut SpeedBlock,
+}
+
+impl Kernel for BlockOfHeights<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for j in 0..BLOCK {
+            for i in 0..BLOCK {
+                self.speeds.set_with(j, i, of_heights(&self.jets.jet(j, i), self.delta));
+            }
+        }
+    }
 }
 
 /// `D = Σ_i s_i w_i w_iᵀ` with `s_i = 1/(δ+|κ_i|)`, in ground axes, and its determinant.
@@ -36,7 +116,7 @@ pub(super) fn isotropic(jet: &HeightJet) -> (Sym2, f64) {
 ///   K < 0:  q = −p/ρ,     c = e + ρ + p²/ρ,       s = 2ρ
 /// ```
 #[inline(always)]
-pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
+pub(super) fn of_heights(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
     let HeightJet { zx, zy, zxx, zxy, zyy, .. } = *jet;
     let a = Sym2::new(1.0 + zy * zy, -zx * zy, 1.0 + zx * zx);
     let w = 1.0 + zx * zx + zy * zy;
@@ -64,7 +144,7 @@ pub(super) fn curvature(jet: &HeightJet, delta: f64) -> (Sym2, f64) {
 
 /// The same on any surface, in grid coordinates: the first formula above with `H`, `K`, `G` and `B` as they are.
 #[inline(always)]
-pub(crate) fn of_surface(jet: &SurfaceJet, delta: f64) -> Sym2 {
+pub(crate) fn in_space(jet: &SurfaceJet, delta: f64) -> Sym2 {
     let Forms { inverse, second: b, mean: h, gaussian: k } = jet.forms();
     let (q, c, sum) = if k < 0.0 {
         let r = (h * h - k).sqrt();
@@ -81,6 +161,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
+    use crate::metric::isotropic;
 
     /// Σ s_i w_i w_iᵀ by the generalised eigenproblem `B w = κ G w`, as the paper writes it.
     fn by_eigenvectors(jet: &HeightJet, delta: f64) -> Sym2 {
@@ -117,7 +198,7 @@ mod tests {
         {
             for (zx, zy) in [(0.0, 0.0), (0.7, -0.3), (-2.0, 1.5)] {
                 let jet = HeightJet { z: 0.0, zx, zy, zxx, zxy, zyy };
-                let (d, det) = curvature(&jet, 0.01);
+                let (d, det) = of_heights(&jet, 0.01);
                 assert!(close(d, by_eigenvectors(&jet, 0.01)), "{jet:?}");
                 assert!((det / d.det() - 1.0).abs() < 1e-11, "{jet:?}");
             }
@@ -127,10 +208,10 @@ mod tests {
     #[test]
     fn planes_and_umbilics_are_isotropic() {
         let plane = HeightJet { zx: 0.4, zy: -0.2, ..HeightJet::default() };
-        assert!(close(curvature(&plane, 0.05).0, isotropic(&plane).0 * 20.0));
+        assert!(close(of_heights(&plane, 0.05).0, isotropic::of_heights(&plane).0 * 20.0));
         let umbilic = HeightJet { zxx: 0.03, zyy: 0.03, ..HeightJet::default() };
-        assert!(close(curvature(&umbilic, 0.01).0, isotropic(&umbilic).0 * 25.0));
+        assert!(close(of_heights(&umbilic, 0.01).0, isotropic::of_heights(&umbilic).0 * 25.0));
         let saddle = HeightJet { zxx: 0.03, zyy: -0.03, ..HeightJet::default() };
-        assert!(close(curvature(&saddle, 0.01).0, isotropic(&saddle).0 * 25.0));
+        assert!(close(of_heights(&saddle, 0.01).0, isotropic::of_heights(&saddle).0 * 25.0));
     }
 }

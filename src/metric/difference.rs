@@ -19,26 +19,48 @@
 //! `√2 sκ` per length.
 
 use std::mem;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{Delta, Speed, curvature};
+use super::nodes::{NodeTensors, Nodes};
+use super::{Delta, Metric, MetricOptions, NamedMetric, Norm, Unit, curvature};
 use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::Sym2;
-use crate::surface::{ParametricSurface, SurfaceJet};
+use crate::surface::{Surface, SurfaceJet};
 
-/// The difference curvature tensor.
+pub(super) const RATE: NamedMetric = NamedMetric {
+    name: "difference",
+    about: "The rate at which the curvature tensor changes, in AG units",
+    make: |options: &MetricOptions| Ok(Box::new(with(DifferenceForm::Rate, options))),
+};
+
+pub(super) const LITERAL: NamedMetric = NamedMetric {
+    name: "difference-literal",
+    about: "The same from cell to cell, as the paper prints it: depends on the cell size and the grid's directions",
+    make: |options: &MetricOptions| Ok(Box::new(with(DifferenceForm::Literal, options))),
+};
+
+fn with(form: DifferenceForm, options: &MetricOptions) -> Difference {
+    let default = Difference::default();
+    Difference {
+        form,
+        curvature_delta: options.delta.unwrap_or(default.curvature_delta),
+        delta: options.difference_delta.unwrap_or(default.delta),
+    }
+}
+
+/// The difference curvature tensor DC, `D = Σ 1/(δ+γ_i) q_i q_iᵀ`, from how CT changes. Computed at the nodes when the metric is
+/// bound; between them `D` is bilinear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// What is taken for the change of the curvature tensor.
     pub form: DifferenceForm,
     /// `δ` of the curvature tensor that is compared. Default: all of the root-mean-square curvature. With a tenth of it, as
     /// routes on the curvature tensor have, `1/(δ+|κ|)` changes most by far where there is next to no curvature, and
-    /// plains become the dearest ground (`docs/mathematics.md` has a measurement).
+    /// plains become the costliest ground (`docs/mathematics.md` has a measurement).
     pub curvature_delta: Delta,
     /// `δ` beside `γ`. [`Delta::Auto`] is a share of the square of the mean of `√(γ1+γ2)` over the surface, but at least 1e-6
     /// (times the mean area of a cell, if literal): changes by less than a thousandth of the way are rounding.
@@ -81,27 +103,20 @@ pub struct Change {
 }
 
 impl Difference {
-    /// How the curvature tensor changes around every node, row-major. 220 ns of one core per node with what [`Metric::on`](crate::Metric::on)
+    /// How the curvature tensor changes around every node, row-major. 220 ns of one core per node with what [`norm`](Metric::norm)
     /// makes of it, and 32 bytes.
     ///
     /// # Errors
     /// A `δ` of the curvature tensor out of range; cancelled.
-    pub fn changes(
-        &self,
-        surface: &dyn ParametricSurface,
-        control: &Control,
-    ) -> Result<Vec<Change>> {
-        let measures = surface.measures();
-        let delta =
-            self.curvature_delta.resolve(|| measures.rms_curvature, measures.area.sqrt())?;
-        self.changes_under(delta, surface, control)
+    pub fn changes(&self, surface: &dyn Surface, control: &Control) -> Result<Vec<Change>> {
+        self.changes_under(self.curvature_delta.on(surface)?, surface, control)
     }
 
     /// The same where the curvature tensor has the given `δ`.
     fn changes_under(
         &self,
         curvature_delta: f64,
-        surface: &dyn ParametricSurface,
+        surface: &dyn Surface,
         control: &Control,
     ) -> Result<Vec<Change>> {
         at_nodes(surface, curvature_delta, control, |around| {
@@ -112,55 +127,71 @@ impl Difference {
             Change { gamma, area: around.here.form.det().sqrt() }
         })
     }
+}
 
-    /// `D` at the nodes of a surface of this root-mean-square curvature and extent, in grid coordinates stretched by `stretch` of
-    /// each row. Not finite where the surface is degenerate; voids have the tensor of the continued surface.
-    pub(super) fn speed(
-        &self,
-        surface: &dyn ParametricSurface,
-        (rms_curvature, extent): (f64, f64),
-        stretch: impl Fn(usize) -> DVec2 + Sync,
-        control: &Control,
-    ) -> Result<Speed> {
+impl Metric for Difference {
+    fn name(&self) -> &str {
+        match self.form {
+            DifferenceForm::Rate => RATE.name,
+            DifferenceForm::Literal => LITERAL.name,
+        }
+    }
+
+    fn unit(&self) -> Unit {
+        Unit::Ag
+    }
+
+    /// `D` is not finite where the surface is degenerate; voids have the tensor of the continued surface.
+    fn norm(&self, surface: &dyn Surface, control: &Control) -> Result<Norm> {
         // The share if it is one; checked before the work.
-        let own = self.delta.resolve(|| 1.0, 1.0)?;
-        let curvature_delta = self.curvature_delta.resolve(|| rms_curvature, extent)?;
+        let number = self.delta.number()?;
+        let curvature_delta = self.curvature_delta.on(surface)?;
         let changes = self.changes_under(curvature_delta, surface, control)?;
         let delta = match self.delta {
-            Delta::Absolute(_) => own,
-            Delta::Auto(_) => offset(surface, self.form, &changes, own),
+            Delta::Absolute(_) => number,
+            Delta::Auto(_) => offset(surface, self.form, &changes, number),
         };
-        let mut tensors = vec![Sym2::default(); changes.len()];
-        let mut products = vec![0.0; changes.len()];
-        let cols = surface.cols().max(1);
-        let rows = changes.par_chunks(cols).zip(tensors.par_chunks_mut(cols));
-        rows.zip(products.par_chunks_mut(cols)).enumerate().for_each(
-            |(row, ((changes, tensors), products))| {
-                if control.cancel.is_cancelled() {
-                    return;
-                }
-                let (jets, by) = (surface.row_space_jets(row), stretch(row));
-                for (i, (change, jet)) in changes.iter().zip(&jets).enumerate() {
-                    let inverse = (change.gamma + Sym2::new(delta, 0.0, delta)).inverse();
-                    tensors[i] = Frame::of(jet.first_form()).to_grid(inverse).stretched(by);
-                    products[i] = change.gamma.det();
-                }
-            },
-        );
-        control.check()?;
-        let nodes = Arc::new((tensors, products));
-        Ok(Speed::Difference { form: self.form, curvature_delta, delta, nodes })
+        let tensors = tensors(surface, &changes, delta, control)?.into();
+        let products: Vec<f64> = changes.par_iter().map(|change| change.gamma.det()).collect();
+        let unit = match self.form {
+            DifferenceForm::Rate => "",
+            DifferenceForm::Literal => "m²",
+        };
+        Ok(Norm::quadratic(NodeTensors { nodes: Nodes::of(surface), tensors })
+            .with_parameter("delta_per_m", curvature_delta, "1/m")
+            .with_parameter("difference_delta", delta, unit)
+            .with_level(delta)
+            .with_seed_ranks(products))
     }
+}
+
+/// `D` at the nodes in the axes of the surface.
+fn tensors(
+    surface: &dyn Surface,
+    changes: &[Change],
+    delta: f64,
+    control: &Control,
+) -> Result<Vec<Sym2>> {
+    let mut tensors = vec![Sym2::default(); changes.len()];
+    let cols = surface.cols().max(1);
+    let rows = changes.par_chunks(cols).zip(tensors.par_chunks_mut(cols)).enumerate();
+    rows.for_each(|(row, (changes, tensors))| {
+        if control.cancel.is_cancelled() {
+            return;
+        }
+        let (jets, axes) = (surface.row_space_jets(row), surface.axes(row as f64));
+        for ((change, jet), tensor) in changes.iter().zip(&jets).zip(tensors) {
+            let inverse = (change.gamma + Sym2::new(delta, 0.0, delta)).inverse();
+            *tensor = Frame::of(jet.first_form()).to_grid(inverse).stretched(axes);
+        }
+    });
+    control.check()?;
+    Ok(tensors)
 }
 
 /// The automatic `δ`, see [`Difference::delta`]. It goes by the mean of `√(γ1+γ2)` over the area that is there and not of its square, since
 /// only the mean has a limit where the curvature jumps.
-fn offset(
-    surface: &dyn ParametricSurface,
-    form: DifferenceForm,
-    changes: &[Change],
-    share: f64,
-) -> f64 {
+fn offset(surface: &dyn Surface, form: DifferenceForm, changes: &[Change], share: f64) -> f64 {
     let of_row = |(row, changes): (usize, &[Change])| {
         let there = changes.iter().enumerate().filter(|(col, _)| !surface.is_void(*col, row));
         there.fold([0.0; 3], |[sum, area, count], (_, change)| {
@@ -226,7 +257,7 @@ struct Node {
 impl Node {
     fn new(jet: &SurfaceJet, delta: f64, void: bool) -> Self {
         let [s1, s2] = jet.first;
-        let d = curvature::of_surface(jet, delta);
+        let d = curvature::in_space(jet, delta);
         let (a, b) = (s1 * d.xx + s2 * d.xy, s1 * d.xy + s2 * d.yy);
         let columns = [0, 1, 2].map(|k| a * s1[k] + b * s2[k]);
         let tensor = DMat3::from_cols(columns[0], columns[1], columns[2]);
@@ -309,7 +340,7 @@ const BAND: usize = 32;
 
 /// `value` at every node, row-major. Three rows of nodes are held at a time.
 fn at_nodes<T: Clone + Default + Send>(
-    surface: &dyn ParametricSurface,
+    surface: &dyn Surface,
     delta: f64,
     control: &Control,
     value: impl Fn(&Around<'_>) -> T + Sync,
@@ -364,11 +395,13 @@ mod tests {
 
     use super::DifferenceForm::{Literal, Rate};
     use super::*;
+    use std::sync::Arc;
+
     use crate::control::CancelToken;
     use crate::error::Error;
     use crate::grid::{GridFrame, Ground};
-    use crate::metric::{Metric, Modifiers};
-    use crate::surface::{FitOptions, HeightSurface, Smoothing};
+    use crate::metric::{Isotropic, Modifiers};
+    use crate::surface::{FitOptions, HeightSurface, Jet, Smoothing};
     use crate::terrain::{Crs, Terrain};
 
     /// The surface of a formula, whose parameters are `origin` at node (0, 0) and change by `steps` per column and per row.
@@ -381,7 +414,7 @@ mod tests {
         jet: F,
     }
 
-    impl<F: Fn(DVec2) -> SurfaceJet + Sync> ParametricSurface for Formula<F> {
+    impl<F: Fn(DVec2) -> SurfaceJet + Sync> Surface for Formula<F> {
         fn cols(&self) -> usize {
             self.counts[0]
         }
@@ -398,18 +431,18 @@ mod tests {
             (self.voids)(col, row)
         }
 
-        fn space_jet(&self, at: DVec2) -> SurfaceJet {
+        fn jet(&self, at: DVec2) -> Jet {
             let [a, b] = self.steps;
             let SurfaceJet { point, first: [s1, s2], second: [s11, s12, s22] } =
                 (self.jet)(self.origin + a * at.x + b * at.y);
             let second = |v: DVec2, w: DVec2| {
                 s11 * (v.x * w.x) + s12 * (v.x * w.y + v.y * w.x) + s22 * (v.y * w.y)
             };
-            SurfaceJet {
+            Jet::Space(SurfaceJet {
                 point,
                 first: [s1 * a.x + s2 * a.y, s1 * b.x + s2 * b.y],
                 second: [second(a, a), second(a, b), second(b, b)],
-            }
+            })
         }
     }
 
@@ -426,7 +459,7 @@ mod tests {
         }
     }
 
-    fn changes_of(surface: &dyn ParametricSurface, form: DifferenceForm) -> Vec<Change> {
+    fn changes_of(surface: &dyn Surface, form: DifferenceForm) -> Vec<Change> {
         let curvature_delta = Delta::Absolute(0.25);
         let difference = Difference { form, curvature_delta, ..Difference::default() };
         difference.changes(surface, &Control::default()).unwrap()
@@ -489,7 +522,7 @@ mod tests {
             let second = |v: f64, w: f64, same: f64| -same / z - v * w / z.powi(3);
             graph(at, [z, -x / z, -y / z, second(x, x, 1.0), second(x, y, 0.0), second(y, y, 1.0)])
         };
-        let still = |surface: &dyn ParametricSurface| {
+        let still = |surface: &dyn Surface| {
             let changes = changes_of(surface, Rate);
             changes.iter().map(|change| change.gamma.xx + change.gamma.yy).fold(0.0, f64::max)
         };
@@ -604,9 +637,9 @@ mod tests {
     fn threads_change_no_bit() {
         let tensors = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let field = |surface: &dyn ParametricSurface| {
-                let metric = Metric::Difference(Difference::default())
-                    .on_surface(surface, &Control::default())
+            let field = |surface: &dyn Surface| {
+                let metric = Difference::default()
+                    .on(surface, &Modifiers::default(), &Control::default())
                     .unwrap();
                 let at = |i: usize| metric.speed(DVec2::new((i % 77) as f64, (i / 77) as f64));
                 (0..77 * 77).map(|i| at(i).unwrap()).collect::<Vec<_>>()
@@ -632,10 +665,15 @@ mod tests {
         let speeds = |form: DifferenceForm, scale: f64| -> Vec<Sym2> {
             let surface =
                 fitted(scale, |x, y| 90.0 * (0.3 * x).sin() + 60.0 * (0.2 * y + 0.1 * x).cos());
-            let metric = Metric::Difference(Difference { form, ..Difference::default() });
+            let metric = Difference { form, ..Difference::default() };
             let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
-            assert!(field.difference_delta().unwrap() > 0.0 && field.delta().unwrap() > 0.0);
-            (0..41).map(|i| field.speed(DVec2::new(f64::from(i), 0.7 * f64::from(i)))).collect()
+            assert!(
+                field.parameter("difference_delta").unwrap() > 0.0
+                    && field.parameter("delta_per_m").unwrap() > 0.0
+            );
+            (0..41)
+                .map(|i| field.speed(DVec2::new(f64::from(i), 0.7 * f64::from(i))).unwrap())
+                .collect()
         };
         for (form, power) in [(Rate, 0), (Literal, -2)] {
             for (a, b) in speeds(form, 1.0).into_iter().zip(speeds(form, 7.0)) {
@@ -649,21 +687,24 @@ mod tests {
     fn on_a_plane_the_metric_is_isotropic() {
         let surface = fitted(1.0, |x, y| 3.0 * x - 7.0 * y + 500.0);
         for form in [Rate, Literal] {
-            let metric = Metric::Difference(Difference { form, ..Difference::default() });
+            let metric = Difference { form, ..Difference::default() };
             let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let geodesic =
-                Metric::Isotropic.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
+                Isotropic.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let at = DVec2::new(3.4, 17.0);
-            let delta = field.difference_delta().unwrap();
-            assert!(error(field.speed(at) * delta, geodesic.speed(at)) < 1e-6, "{form:?}");
+            let delta = field.parameter("difference_delta").unwrap();
+            assert!(
+                error(field.speed(at).unwrap() * delta, geodesic.speed(at).unwrap()) < 1e-6,
+                "{form:?}"
+            );
         }
     }
 
     #[test]
     fn binding_can_be_cancelled() {
         let cancelled = |control: &Control| {
-            let (metric, surface) = (Metric::Difference(Difference::default()), square(150, hills));
-            let in_space = metric.on_surface(&surface, control);
+            let (metric, surface) = (Difference::default(), square(150, hills));
+            let in_space = metric.on(&surface, &Modifiers::default(), control);
             assert!(matches!(in_space, Err(Error::Cancelled)));
             let surface = fitted(1.0, |x, y| x * y);
             let on_ground = metric.on(&surface, &Modifiers::default(), control);
@@ -688,8 +729,8 @@ mod tests {
         let none = Modifiers::default();
         for bad in [Delta::Auto(0.0), Delta::Absolute(f64::NAN), Delta::Absolute(-1.0)] {
             let default = Difference::default();
-            let own = Metric::Difference(Difference { delta: bad, ..default });
-            let inner = Metric::Difference(Difference { curvature_delta: bad, ..default });
+            let own = Difference { delta: bad, ..default };
+            let inner = Difference { curvature_delta: bad, ..default };
             assert!(
                 own.on(&surface, &none, &Control::default()).is_err()
                     && inner.on(&surface, &none, &Control::default()).is_err()

@@ -7,8 +7,7 @@ use crate::control::Control;
 use crate::eikonal::{Balls, TensorField};
 use crate::error::{Error, Result};
 use crate::metric::MetricField;
-use crate::metric::SurfaceMetric;
-use crate::surface::ParametricSurface;
+use crate::surface::Surface;
 
 /// Most clusters of a cover: beyond this `ε` is surely a mistake.
 const MOST: usize = 1 << 16;
@@ -16,7 +15,7 @@ const MOST: usize = 1 << 16;
 /// `|K|` at the nodes, row-major, 1/m²: seeds of the curvature metric are taken in ascending order of it, so that the first clusters
 /// are those of the flattest ground. Cost: one evaluation of the surface per node.
 #[must_use]
-pub fn gaussian_ranks(surface: &dyn ParametricSurface) -> Vec<f64> {
+pub fn gaussian_ranks(surface: &dyn Surface) -> Vec<f64> {
     let of_row = |row| {
         let jets = surface.row_space_jets(row).into_iter();
         jets.map(|jet| jet.mean_and_gaussian()[1].abs())
@@ -25,19 +24,11 @@ pub fn gaussian_ranks(surface: &dyn ParametricSurface) -> Vec<f64> {
 }
 
 impl MetricField<'_> {
-    /// What the nodes are ranked by as seeds, row-major: `γ1 γ2` on the difference metric, which is least where the shape changes
-    /// least and known since the metric was bound; [`gaussian_ranks`] on the others.
+    /// What the nodes are ranked by as seeds, row-major: what the metric itself says
+    /// ([`Norm::with_seed_ranks`](crate::metric::Norm::with_seed_ranks): `γ1 γ2` on the difference metric), else [`gaussian_ranks`].
     #[must_use]
     pub fn seed_ranks(&self) -> Vec<f64> {
-        self.gamma_products().map_or_else(|| gaussian_ranks(self.surface()), <[f64]>::to_vec)
-    }
-}
-
-impl SurfaceMetric<'_> {
-    /// What the nodes are ranked by as seeds, as [`MetricField::seed_ranks`].
-    #[must_use]
-    pub fn seed_ranks(&self) -> Vec<f64> {
-        self.gamma_products().map_or_else(|| gaussian_ranks(self.surface()), <[f64]>::to_vec)
+        self.own_seed_ranks().map_or_else(|| gaussian_ranks(self.surface()), <[f64]>::to_vec)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{Level, Neighbours, Segmentation, signatures};
 use crate::control::Control;
 use crate::error::{Error, Result};
-use crate::surface::ParametricSurface;
+use crate::surface::Surface;
 
 impl Segmentation {
     /// Joins neighbours on the last level that have one parent and whose signatures differ by at most `tolerance`, see
@@ -18,7 +18,7 @@ impl Segmentation {
     /// A tolerance that is not between 0 and 1; a surface of another size; cancelled.
     pub fn merge_alike(
         &mut self,
-        surface: &dyn ParametricSurface,
+        surface: &dyn Surface,
         tolerance: f64,
         control: &Control,
     ) -> Result<()> {
@@ -103,12 +103,12 @@ mod tests {
 
     use super::*;
     use crate::region::Region;
-    use crate::surface::SurfaceJet;
+    use crate::surface::{Jet, SurfaceJet};
 
     /// Flat in the west, waves in the east.
     struct Half;
 
-    impl ParametricSurface for Half {
+    impl Surface for Half {
         fn cols(&self) -> usize {
             60
         }
@@ -117,14 +117,14 @@ mod tests {
             20
         }
 
-        fn space_jet(&self, at: DVec2) -> SurfaceJet {
+        fn jet(&self, at: DVec2) -> Jet {
             let x = at.x - 29.5;
             let bend = if x > 0.0 { x.sin() } else { 0.0 };
-            SurfaceJet {
+            Jet::Space(SurfaceJet {
                 point: DVec3::new(at.x, -at.y, bend),
                 first: [DVec3::X, -DVec3::Y],
                 second: [DVec3::Z * bend, DVec3::ZERO, DVec3::ZERO],
-            }
+            })
         }
     }
 

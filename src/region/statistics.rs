@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Level;
-use crate::surface::{ParametricSurface, SurfaceJet};
+use crate::surface::{Surface, SurfaceJet};
 
 /// Measures of a region. Means are over its area on the surface, so that they do not depend on the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -57,7 +57,7 @@ impl RegionStatistics {
 
 /// Measures of the regions of a level, in the order of [`Level::regions`]. Cost: one evaluation of the surface per node.
 #[must_use]
-pub fn statistics(surface: &dyn ParametricSurface, level: &Level) -> Vec<RegionStatistics> {
+pub fn statistics(surface: &dyn Surface, level: &Level) -> Vec<RegionStatistics> {
     /// Rows that are evaluated at a time; they are added up one after the other, so that the sums do not depend on the threads.
     const ROWS: usize = 64;
     let mut sums = vec![RegionStatistics::default(); level.regions.len()];

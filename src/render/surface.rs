@@ -9,7 +9,7 @@ use super::layout::{SIDE, SIDES};
 use super::regions::draw_numbers;
 use super::text;
 use crate::error::{Error, Result};
-use crate::surface::ParametricSurface;
+use crate::surface::Surface;
 
 /// Share of the light that is everywhere.
 const AMBIENT: f64 = 0.4;
@@ -26,7 +26,7 @@ const LIFT: f64 = 0.005;
 #[derive(Clone)]
 pub struct SurfacePicture<'a> {
     /// The surface. Nodes that are void leave holes.
-    pub surface: &'a dyn ParametricSurface,
+    pub surface: &'a dyn Surface,
     /// A colour per node, row-major.
     pub colours: &'a [Rgb],
     /// Whether colours go over into each other between nodes, as those of a field, or each node has its own place, as
@@ -50,7 +50,7 @@ pub struct SurfacePicture<'a> {
 impl<'a> SurfacePicture<'a> {
     /// A picture of a surface with a colour per node.
     #[must_use]
-    pub fn new(surface: &'a dyn ParametricSurface, colours: &'a [Rgb]) -> Self {
+    pub fn new(surface: &'a dyn Surface, colours: &'a [Rgb]) -> Self {
         Self {
             surface,
             colours,

@@ -2,19 +2,17 @@
 //!
 //! [`trace`] follows the distance down from the goal (`descent.rs`) and moves the line to where it is shortest on the
 //! surface itself (`polish.rs`); [`Summary`] and [`ProfilePoint`] measure the line on
-//! the smooth surface (`profile.rs`); [`trace_on`] does so on a surface in space; [`Comparison`] sets the routes of several metrics side by side.
+//! the smooth surface (`profile.rs`); [`Comparison`] sets the routes of several metrics side by side.
 
 mod compare;
 mod descent;
 mod polish;
 mod profile;
-mod space;
 
 use glam::{DVec2, DVec3};
 
 pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
-pub use self::space::{SurfaceRoute, trace_on};
 use crate::eikonal::DistanceMap;
 use crate::eikonal::{TensorField, sees};
 use crate::error::{Error, Result};
@@ -24,9 +22,11 @@ use crate::metric::MetricField;
 /// A route over a surface, from the start region to a goal.
 #[derive(Clone, Debug)]
 pub struct Route {
-    /// Points in grid coordinates (column, row), from start to goal.
+    /// Points in grid coordinates (column, row), from start to goal. Over the seam of a closed direction they go on beyond the
+    /// grid.
     pub grid: Vec<DVec2>,
-    /// The same points as map coordinates and height of the surface in metres.
+    /// The same points as map coordinates and height in metres, or in space, m: see
+    /// [`Surface::point`](crate::Surface::point).
     pub points: Vec<DVec3>,
     /// The numbers of the route.
     pub summary: Summary,
@@ -38,13 +38,16 @@ pub struct Route {
 /// The line begins exactly on the start region, ends exactly at the goal, has a point at least every half cell, and
 /// enters no wall. It is the line of steepest descent on the distance, moved sideways to the nearest one that is shortest under
 /// `metric`, which knows the surface between the nodes too; it never costs more than that line. [`Summary::cost`] is measured
-/// between the nodes as well, so it differs from the distance at the goal by the errors of both.
+/// between the nodes as well, so it differs from the distance at the goal by the errors of both. In a closed direction the line
+/// begins at the image of the start that is nearest to the goal.
 ///
 /// # Errors
-/// [`Error::NoWay`] if the front did not reach the goal; [`Error::Usage`] if the goal is not on the grid.
+/// [`Error::NoWay`] if the front did not reach the goal; [`Error::Usage`] if the goal is not on the grid or the metric has no
+/// quadratic form.
 pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> Result<Route> {
+    metric.check_quadratic()?;
     let grid = shortest(distance, goal, &|at| metric.grid_metric(at))?.ok_or_else(|| {
-        let at = metric.surface().frame().to_map(goal);
+        let at = metric.surface().frame().map_or(goal, |frame| frame.to_map(goal));
         Error::NoWay(format!(
             "there is no way from the start to the goal at {}, {}: voids, barriers or too steep ground lie between",
             at.x, at.y
@@ -91,8 +94,7 @@ impl Route {
     #[must_use]
     pub fn from_line(grid: Vec<DVec2>, metric: &MetricField<'_>) -> Self {
         let surface = metric.surface();
-        let points =
-            grid.iter().map(|&at| surface.frame().to_map(at).extend(surface.height(at))).collect();
+        let points = grid.iter().map(|&at| surface.point(at)).collect();
         let summary = Summary::measure(&grid, metric);
         Self { grid, points, summary }
     }
@@ -103,7 +105,7 @@ mod tests {
     use super::*;
     use crate::control::Control;
     use crate::eikonal::{Solver, Stop};
-    use crate::metric::{Metric, Modifiers};
+    use crate::metric::{Curvature, Isotropic, Metric, Modifiers};
     use crate::surface::{FitOptions, HeightSurface};
     use crate::terrain::Terrain;
 
@@ -112,9 +114,8 @@ mod tests {
         let control = Control::default();
         let terrain = Terrain::open("data/jacksboro.tif").unwrap();
         let surface = HeightSurface::fit(&terrain, &FitOptions::default(), &control).unwrap();
-        for (metric, shorter) in
-            [(Metric::Isotropic, 1e-4), (Metric::Curvature(Default::default()), 0.01)]
-        {
+        let metrics: [(&dyn Metric, f64); 2] = [(&Isotropic, 1e-4), (&Curvature::default(), 0.01)];
+        for (metric, shorter) in metrics {
             let field = metric.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
             let start = DVec2::new(100.0, 160.0);
             let distance =

@@ -1,27 +1,24 @@
 //! The numbers of a route, measured on the smooth surface.
 
-use glam::DVec2;
-use serde::Serialize;
+use glam::{DVec2, DVec3};
+use serde::{Serialize, Serializer};
 
 use super::Route;
-use crate::metric::MetricField;
-use crate::surface::{HeightJet, HeightSurface};
+use crate::metric::{MetricField, Parameter, Unit, length_along};
+use crate::surface::{Jet, Surface};
 
-/// The numbers of a route. Lengths and heights in metres, grades in percent: rise per plan length.
+/// The numbers of a route. Lengths and heights in metres, grades in percent: rise per plan length. The third axis is up.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Name of the metric.
     pub metric: String,
-    /// `δ` of the curvature tensor, 1/m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub delta_per_m: Option<f64>,
-    /// `δ` of the difference tensor, in the unit of its `γ`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub difference_delta: Option<f64>,
+    /// Parameters of the metric; in JSON members beside the others.
+    #[serde(flatten, serialize_with = "members")]
+    pub parameters: Vec<Parameter>,
     /// Length of the line under the route's own metric.
     pub cost: f64,
-    /// Unit of the cost: `m` or `AG units`.
-    pub cost_unit: String,
+    /// Unit of the cost.
+    pub cost_unit: Unit,
     /// Length on the surface, m.
     pub length_m: f64,
     /// Length on the map, m.
@@ -39,12 +36,17 @@ pub struct Summary {
     /// `∫|κ_n| ds`, the total normal curvature along the route, radians: how much the ground makes the
     /// traveller pitch.
     pub total_normal_curvature_rad: f64,
-    /// Start in map coordinates.
+    /// Start in map coordinates, or `x` and `y` in space.
     pub start: [f64; 2],
-    /// Goal in map coordinates.
+    /// Goal in map coordinates, or `x` and `y` in space.
     pub goal: [f64; 2],
     /// Name and version of this software.
     pub software: String,
+}
+
+/// Parameters as members of an object.
+fn members<S: Serializer>(parameters: &[Parameter], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(parameters.iter().map(|parameter| (parameter.name, parameter.value)))
 }
 
 /// One sample of a route's profile.
@@ -52,9 +54,9 @@ pub struct Summary {
 pub struct ProfilePoint {
     /// Length on the surface from the start, m.
     pub distance_m: f64,
-    /// Map coordinate.
+    /// Map coordinate, or `x` in space.
     pub x: f64,
-    /// Map coordinate.
+    /// Map coordinate, or `y` in space.
     pub y: f64,
     /// Height, m.
     pub height_m: f64,
@@ -62,12 +64,14 @@ pub struct ProfilePoint {
     pub grade_percent: f64,
     /// Slope of the ground across the route, degrees.
     pub side_slope_deg: f64,
-    /// Normal curvature along the route, 1/m; positive where the ground is hollow.
+    /// Normal curvature along the route, 1/m; positive where the surface bends towards its normal: on heights in hollows.
     pub normal_curvature_per_m: f64,
 }
 
 /// A short straight piece of a line, seen at its middle.
 struct Piece {
+    /// Length on the surface, m.
+    length: f64,
     /// Plan length, m.
     plan: f64,
     /// Rise, m.
@@ -79,19 +83,18 @@ struct Piece {
 }
 
 impl Piece {
-    fn new(surface: &HeightSurface, from: DVec2, to: DVec2) -> Self {
+    fn new(surface: &dyn Surface, from: DVec2, to: DVec2) -> Self {
         let middle = from.midpoint(to);
-        let v = surface.frame().ground_vector(middle.y, to - from);
+        let by = (to - from) * surface.axes(middle.y);
         let jet = surface.jet(middle);
-        let rise = surface.height(to) - surface.height(from);
-        let plan = v.length();
-        let (side, curvature) = across(&jet, v);
-        Self { plan, rise, side, curvature }
-    }
-
-    /// Length on the surface, m.
-    fn length(&self) -> f64 {
-        self.plan.hypot(self.rise)
+        let Course { side, curvature, .. } = Course::new(&jet, by);
+        let chord = surface.point(to) - surface.point(from);
+        let rise = chord.z;
+        let (plan, length) = match jet {
+            Jet::Height(_) => (by.length(), by.length().hypot(rise)),
+            Jet::Space(_) => (chord.truncate().length(), length_in_space(surface, &[from, to])),
+        };
+        Self { length, plan, rise, side, curvature }
     }
 
     fn grade_percent(&self) -> f64 {
@@ -99,14 +102,45 @@ impl Piece {
     }
 }
 
-/// Slope across a direction `v` (ground axes), and the normal curvature `vᵀBv / vᵀGv` along it.
-fn across(jet: &HeightJet, v: DVec2) -> (f64, f64) {
-    let Some(t) = v.try_normalize() else { return (0.0, 0.0) };
-    let gradient = DVec2::new(jet.zx, jet.zy);
-    let along = gradient.dot(t);
-    let bend = jet.zxx * t.x * t.x + 2.0 * jet.zxy * t.x * t.y + jet.zyy * t.y * t.y;
-    let w = (1.0 + gradient.length_squared()).sqrt();
-    (gradient.perp_dot(t).abs(), bend / (w * (1.0 + along * along)))
+/// Length of a line on a surface in space, m.
+fn length_in_space(surface: &dyn Surface, line: &[DVec2]) -> f64 {
+    length_along(line, |at, by| surface.jet(at).first_form().norm(by))
+}
+
+/// What the surface does along a direction.
+struct Course {
+    /// Rise per plan length along it.
+    grade: f64,
+    /// The same across it, without a sign.
+    side: f64,
+    /// Normal curvature `vᵀBv / vᵀGv`, 1/m.
+    curvature: f64,
+}
+
+impl Course {
+    /// Along a step `v` in the axes of the jet; all 0 for no step.
+    fn new(jet: &Jet, v: DVec2) -> Self {
+        let Some(t) = v.try_normalize() else {
+            return Self { grade: 0.0, side: 0.0, curvature: 0.0 };
+        };
+        match jet {
+            Jet::Height(jet) => {
+                let gradient = jet.gradient();
+                let grade = gradient.dot(t);
+                let bend = jet.zxx * t.x * t.x + 2.0 * jet.zxy * t.x * t.y + jet.zyy * t.y * t.y;
+                let w = (1.0 + gradient.length_squared()).sqrt();
+                let curvature = bend / (w * (1.0 + grade * grade));
+                Self { grade, side: gradient.perp_dot(t).abs(), curvature }
+            }
+            Jet::Space(space) => {
+                let tangent = space.first[0] * t.x + space.first[1] * t.y;
+                let plan = tangent.truncate();
+                let side = jet.gradient().perp_dot(plan.normalize_or_zero()).abs();
+                let grade = tangent.z / plan.length();
+                Self { grade, side, curvature: jet.normal_curvature(t) }
+            }
+        }
+    }
 }
 
 /// Cuts a line into straight pieces of at most `longest` cells.
@@ -124,14 +158,14 @@ const PIECE_CELLS: f64 = 0.5;
 impl Summary {
     pub(super) fn measure(line: &[DVec2], metric: &MetricField<'_>) -> Self {
         let surface = metric.surface();
-        let map =
-            |at: Option<&DVec2>| at.map_or([f64::NAN; 2], |&at| surface.frame().to_map(at).into());
+        let map = |at: Option<&DVec2>| {
+            at.map_or([f64::NAN; 2], |&at| surface.point(at).truncate().into())
+        };
         let mut summary = Self {
             metric: metric.name().to_owned(),
-            delta_per_m: metric.delta(),
-            difference_delta: metric.difference_delta(),
+            parameters: metric.parameters().to_vec(),
             cost: metric.length(line),
-            cost_unit: metric.unit().to_owned(),
+            cost_unit: metric.unit(),
             length_m: 0.0,
             plan_length_m: 0.0,
             climb_m: 0.0,
@@ -146,14 +180,14 @@ impl Summary {
         };
         for (from, to) in pieces(line, PIECE_CELLS) {
             let piece = Piece::new(surface, from, to);
-            summary.length_m += piece.length();
+            summary.length_m += piece.length;
             summary.plan_length_m += piece.plan;
             summary.climb_m += piece.rise.max(0.0);
             summary.descent_m += (-piece.rise).max(0.0);
             summary.max_grade_percent = summary.max_grade_percent.max(piece.grade_percent().abs());
             summary.max_side_slope_deg =
                 summary.max_side_slope_deg.max(piece.side.atan().to_degrees());
-            summary.total_normal_curvature_rad += piece.curvature.abs() * piece.length();
+            summary.total_normal_curvature_rad += piece.curvature.abs() * piece.length;
         }
         if summary.plan_length_m > 0.0 {
             summary.mean_grade_percent =
@@ -166,11 +200,11 @@ impl Summary {
 impl Route {
     /// Samples at equal steps of at most `step` metres along the surface, both ends included.
     #[must_use]
-    pub fn profile(&self, surface: &HeightSurface, step: f64) -> Vec<ProfilePoint> {
+    pub fn profile(&self, surface: &dyn Surface, step: f64) -> Vec<ProfilePoint> {
         let mut knots = vec![(0.0, self.grid[0])];
         for (from, to) in pieces(&self.grid, PIECE_CELLS) {
             let (travelled, _) = knots[knots.len() - 1];
-            knots.push((travelled + Piece::new(surface, from, to).length(), to));
+            knots.push((travelled + Piece::new(surface, from, to).length, to));
         }
         let total = knots[knots.len() - 1].0;
         let count = (total / step).ceil().clamp(1.0, MAX_SAMPLES);
@@ -191,25 +225,23 @@ impl Route {
 const MAX_SAMPLES: f64 = 1e6;
 
 fn sample(
-    surface: &HeightSurface,
+    surface: &dyn Surface,
     (before, from): (f64, DVec2),
     (after, to): (f64, DVec2),
     distance: f64,
 ) -> ProfilePoint {
     let share = if after > before { (distance - before) / (after - before) } else { 0.0 };
     let at = from.lerp(to, share);
-    let v = surface.frame().ground_vector(at.y, to - from);
     let jet = surface.jet(at);
-    let (side, curvature) = across(&jet, v);
-    let along = v.try_normalize().map_or(0.0, |t| DVec2::new(jet.zx, jet.zy).dot(t));
-    let map = surface.frame().to_map(at);
+    let course = Course::new(&jet, (to - from) * surface.axes(at.y));
+    let DVec3 { x, y, z } = surface.point(at);
     ProfilePoint {
         distance_m: distance,
-        x: map.x,
-        y: map.y,
-        height_m: jet.z,
-        grade_percent: 100.0 * along,
-        side_slope_deg: side.atan().to_degrees(),
-        normal_curvature_per_m: curvature,
+        x,
+        y,
+        height_m: z,
+        grade_percent: 100.0 * course.grade,
+        side_slope_deg: course.side.atan().to_degrees(),
+        normal_curvature_per_m: course.curvature,
     }
 }

@@ -4,10 +4,11 @@
 //! towards its upward normal: in a hollow.
 
 use glam::{DVec2, DVec3};
-use multiversion::multiversion;
 
 use super::HeightJet;
-use super::bspline::block::{BLOCK, JetBlock};
+use super::bspline::block::{BLOCK, HeightBlock, Lanes};
+use crate::linalg::Sym2;
+use crate::linalg::simd::Kernel;
 
 /// Curvatures of a surface at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,7 @@ pub struct Curvature {
 impl HeightJet {
     /// Gradient `∇z`: points uphill, its length is the tangent of the slope.
     #[must_use]
+    #[inline(always)]
     pub fn gradient(&self) -> DVec2 {
         DVec2::new(self.zx, self.zy)
     }
@@ -42,24 +44,23 @@ impl HeightJet {
         DVec3::new(-self.zx, -self.zy, 1.0) / self.stretch()
     }
 
-    /// First fundamental form `G = I + ∇z ∇zᵀ` as `[G11, G12, G22]`: `√(vᵀGv)` is the length on the
-    /// surface of a plan vector `v`.
+    /// First fundamental form `G = I + ∇z ∇zᵀ`: `√(vᵀGv)` is the length on the surface of a plan vector `v`.
     #[must_use]
-    pub fn first_form(&self) -> [f64; 3] {
-        [1.0 + self.zx * self.zx, self.zx * self.zy, 1.0 + self.zy * self.zy]
+    pub fn first_form(&self) -> Sym2 {
+        Sym2::new(1.0 + self.zx * self.zx, self.zx * self.zy, 1.0 + self.zy * self.zy)
     }
 
-    /// Second fundamental form `B = Hess z/√(1+|∇z|²)` as `[B11, B12, B22]`, 1/m.
+    /// Second fundamental form `B = Hess z/√(1+|∇z|²)`, 1/m.
     #[must_use]
-    pub fn second_form(&self) -> [f64; 3] {
-        [self.zxx, self.zxy, self.zyy].map(|h| h / self.stretch())
+    pub fn second_form(&self) -> Sym2 {
+        let [xx, xy, yy] = [self.zxx, self.zxy, self.zyy].map(|h| h / self.stretch());
+        Sym2::new(xx, xy, yy)
     }
 
     /// Curvature `vᵀBv / vᵀGv`, 1/m, of the normal section along the plan direction `v`, whatever its length.
     #[must_use]
     pub fn normal_curvature(&self, v: DVec2) -> f64 {
-        let apply = |[a, b, c]: [f64; 3]| (a * v.x + 2.0 * b * v.y) * v.x + c * v.y * v.y;
-        apply(self.second_form()) / apply(self.first_form())
+        self.second_form().form(v) / self.first_form().form(v)
     }
 
     /// Gaussian, mean and principal curvatures with their directions.
@@ -69,9 +70,10 @@ impl HeightJet {
         // pencil B w = κ G w becomes an ordinary symmetric eigenproblem [a b; b c].
         let uphill = self.gradient().normalize_or(DVec2::X);
         let (e1, e2) = (uphill / self.stretch(), uphill.perp());
-        let [b11, b12, b22] = self.second_form();
-        let form =
-            |v: DVec2, w: DVec2| b11 * v.x * w.x + b12 * (v.x * w.y + v.y * w.x) + b22 * v.y * w.y;
+        let b = self.second_form();
+        let form = |v: DVec2, w: DVec2| {
+            b.xx * v.x * w.x + b.xy * (v.x * w.y + v.y * w.x) + b.yy * v.y * w.y
+        };
         let (a, b, c) = (form(e1, e1), form(e1, e2), form(e2, e2));
         let (mean, half) = ((a + c) / 2.0, (a - c) / 2.0);
         let radius = half.hypot(b);
@@ -100,27 +102,37 @@ impl HeightJet {
     }
 
     /// Surface area per plan area, `√(1+|∇z|²)`.
+    #[inline(always)]
     fn stretch(&self) -> f64 {
         (1.0 + self.gradient().length_squared()).sqrt()
     }
 }
 
-/// Sum of `κ1² + κ2²` over the `valid` nodes of a block, 1/m². Added lane by lane, so that it is the same to the
+/// Sums over the nodes of a block of `κ1² + κ2²`, 1/m², and of the area, m². Added lane by lane, so that they are the same to the
 /// last bit on every instruction set.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1",
-))]
-pub(super) fn sum_of_squared_curvatures(jets: &JetBlock, valid: &[[bool; BLOCK]; BLOCK]) -> f64 {
-    let mut sums = [0.0; BLOCK];
-    for (row, valid) in valid.iter().enumerate() {
-        for i in 0..BLOCK {
-            let square = jets.jet(row, i).squared_curvature();
-            sums[i] += if valid[i] { square } else { 0.0 };
+pub(super) struct BlockSums<'a> {
+    pub(super) jets: &'a HeightBlock,
+    /// The area of the map, m², that each node stands for; 0 if it does not count.
+    pub(super) plan: &'a [Lanes; BLOCK],
+}
+
+impl Kernel for BlockSums<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn run(self) -> [f64; 2] {
+        let (mut squares, mut areas) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for (row, plan) in self.plan.iter().enumerate() {
+            for i in 0..BLOCK {
+                let jet = self.jets.jet(row, i);
+                let (counts, square) = (plan[i] > 0.0, jet.squared_curvature());
+                squares[i] += if counts { square } else { 0.0 };
+                let area = plan[i] * jet.stretch();
+                areas[i] += if counts { area } else { 0.0 };
+            }
         }
+        [squares.iter().sum(), areas.iter().sum()]
     }
-    sums.iter().sum()
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! `ridgeway compare`: one pair of places under several metrics.
 
 use ridgeway::export::routes_geojson;
+use ridgeway::metric::NamedMetric;
 use ridgeway::{Comparison, Control, Error, MetricField, Result, Route, Terrain};
 use serde_json::{Value, json};
 
 use super::render;
 use super::route::{HEADER, measures, profiles};
-use crate::args::{CompareArgs, MetricName, RunArgs};
+use crate::args::{CURVATURE, CompareArgs, RunArgs, known};
 use crate::output::{check_outputs_in, write_contents};
 use crate::plan::Journey;
 use crate::report::{Report, Table, wrote_in};
@@ -20,7 +21,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     if let Some(folder) = &args.output {
         check_outputs_in(folder, &FILES, args.overwrite)?;
     }
-    let names = metrics(args)?;
+    let metrics = metrics(args)?;
     let places = (&args.start.start[..], std::slice::from_ref(&args.goal));
     let (journey, terrain) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
     let [goal] = &journey.goals[..] else {
@@ -30,8 +31,10 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
             journey.goals.len()
         )));
     };
-    let fields =
-        names.into_iter().map(|name| journey.field(name, control)).collect::<Result<Vec<_>>>()?;
+    let fields = metrics
+        .into_iter()
+        .map(|metric| journey.field(metric, control))
+        .collect::<Result<Vec<_>>>()?;
     let comparison = Comparison::between(
         args.ground.metric.solver(),
         &fields,
@@ -55,21 +58,17 @@ const EXPLANATION: &str =
     "x METRIC: cost under that metric, as a ratio to the best route under it\n";
 
 /// The metrics asked for, each once.
-fn metrics(args: &CompareArgs) -> Result<Vec<MetricName>> {
-    let mut names = args.metrics.clone();
-    if names.is_empty() {
-        names = vec![
-            MetricName::Isotropic,
-            MetricName::Curvature,
-            MetricName::Difference,
-            args.ground.metric.default_name(),
-        ];
+fn metrics(args: &CompareArgs) -> Result<Vec<NamedMetric>> {
+    let mut metrics = args.metrics.clone();
+    if metrics.is_empty() {
+        metrics = ["isotropic", CURVATURE, "difference"].map(known).into();
+        metrics.push(args.ground.metric.default_metric());
     }
-    args.ground.metric.check_tensor(&names)?;
-    let mut once = Vec::new();
-    for name in names {
-        if !once.contains(&name) {
-            once.push(name);
+    args.ground.metric.check_tensor(&metrics)?;
+    let mut once: Vec<NamedMetric> = Vec::new();
+    for metric in metrics {
+        if !once.iter().any(|other| other.name == metric.name) {
+            once.push(metric);
         }
     }
     Ok(once)

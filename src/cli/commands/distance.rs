@@ -106,7 +106,7 @@ fn isolines_file(
     let frame = journey.georeference.frame();
     let lines = isolines(frame, values, &levels_by_step(values, step)?)?;
     let crs = journey.georeference.crs();
-    Ok(isolines_geojson(&lines, frame, map.unit(), crs, provenance)?.into_bytes())
+    Ok(isolines_geojson(&lines, frame, map.unit().symbol(), crs, provenance)?.into_bytes())
 }
 
 /// Number of the cells that are reached and the largest distance of one.
@@ -199,8 +199,8 @@ fn report(
         json: json!({
             "metric": field.name(),
             "unit": unit,
-            "delta_per_m": field.delta(),
-            "difference_delta": field.difference_delta(),
+            "delta_per_m": field.parameter("delta_per_m"),
+            "difference_delta": field.parameter("difference_delta"),
             "cells": nodes,
             "reached": reached,
             "distance": statistics,

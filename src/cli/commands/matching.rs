@@ -11,12 +11,12 @@ use ridgeway::render::{
     LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, pair_colour, png,
 };
 use ridgeway::surface::{NurbsGrid, NurbsSurface};
-use ridgeway::{Control, Error, ParametricSurface, Result, Terrain};
+use ridgeway::{Control, Error, Modifiers, Result, Surface, Terrain};
 use serde_json::{Value, json};
 
 use super::render::title;
 use super::segment::cut;
-use crate::args::{MatchArgs, MetricName, RunArgs};
+use crate::args::{CURVATURE, MatchArgs, RunArgs, known};
 use crate::output::{check_outputs_in, write_contents};
 use crate::plan::{Journey, command_line};
 use crate::report::{Report, Table, digits, metres, wrote_in};
@@ -92,10 +92,11 @@ impl<'a> Subject<'a> {
             }
             let (cols, rows) = args.nodes;
             let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
-            let metric =
-                args.ground.metric.metric(args.metric.unwrap_or(MetricName::Curvature), None)?;
-            let metric = metric.on_surface(&surface, control)?;
-            let (ranks, field) = (metric.seed_ranks(), metric.sample(control)?);
+            let named = args.metric.unwrap_or(known(CURVATURE));
+            let metric = args.ground.metric.metric(named, None)?;
+            let metric = metric.on(&surface, &Modifiers::default(), control)?;
+            let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
+            drop(metric);
             (Ground::Nurbs(Box::new(surface)), ranks, field)
         } else {
             let name = args.ground.metric.chosen(args.metric)?;
@@ -126,7 +127,7 @@ impl<'a> Subject<'a> {
 }
 
 impl Ground<'_> {
-    fn surface(&self) -> &dyn ParametricSurface {
+    fn surface(&self) -> &dyn Surface {
         match self {
             Self::Heights(journey, _) => &journey.surface,
             Self::Nurbs(surface) => &**surface,

@@ -5,7 +5,7 @@ use std::path::Path;
 use ridgeway::grid::{Isoline, isolines, levels_by_step, round_step};
 use ridgeway::render::{FieldPicture, Gradient, IsolineLayer, MapPicture, Rgb, RouteLayer};
 use ridgeway::route::trace;
-use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Route, Stop, Terrain};
+use ridgeway::{Control, DistanceMap, Error, MetricField, Result, Route, Stop, Terrain, Unit};
 use serde_json::json;
 
 use crate::args::{Layer, Picture, RenderArgs, RunArgs};
@@ -106,8 +106,8 @@ pub(super) fn map(
             1 => String::new(),
             _ => format!(" to {}", i + 1),
         };
-        let label = match s.cost_unit.as_str() {
-            "m" => format!("{} route{goal}: {length}", s.metric),
+        let label = match s.cost_unit {
+            Unit::Metres => format!("{} route{goal}: {length}", s.metric),
             unit => format!("{} route{goal}: {length}, {}", s.metric, distance(s.cost, unit)),
         };
         map.routes.push(RouteLayer { grid: &route.grid, colour: colour(&s.metric), label });

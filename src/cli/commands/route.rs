@@ -84,7 +84,7 @@ fn table(routes: &[(&str, &Route)]) -> Table {
     table.row(HEADER.into_iter().chain(["cost"]));
     for (name, route) in routes {
         let s = &route.summary;
-        table.row(measures(name, route).into_iter().chain([distance(s.cost, &s.cost_unit)]));
+        table.row(measures(name, route).into_iter().chain([distance(s.cost, s.cost_unit)]));
     }
     table
 }

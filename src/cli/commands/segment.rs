@@ -7,7 +7,7 @@ use ridgeway::region::{
     statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
-use ridgeway::{Control, HeightSurface, MetricField, ParametricSurface, Result, Solver, Terrain};
+use ridgeway::{Control, HeightSurface, MetricField, Result, Solver, Surface, Terrain};
 use serde_json::{Map, Value, json};
 
 use super::render::title;
@@ -56,7 +56,7 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     let json = json!({
         "metric": metric.name(),
         "unit": metric.unit(),
-        "delta_per_m": metric.delta(),
+        "delta_per_m": metric.parameter("delta_per_m"),
         "regions": regions,
         "provenance": provenance,
     });
@@ -68,7 +68,7 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
 /// # Errors
 /// Radii that do not fall; too many or no regions; cancelled.
 pub(super) fn cut(
-    surface: &dyn ParametricSurface,
+    surface: &dyn Surface,
     field: TensorField,
     ranks: Vec<f64>,
     regions: &RegionArgs,
@@ -119,7 +119,7 @@ impl Outcome<'_> {
                     add("region", (i + 1).into());
                     add("parent", region.parent.map(|parent| parent + 1).into());
                     add("epsilon", region.epsilon.into());
-                    add("epsilon_unit", self.metric.unit().into());
+                    add("epsilon_unit", self.metric.unit().symbol().into());
                     add("seed", json!(seed.to_array()));
                     add("signature", json!(signature.eigenvalues));
                     if let Ok(Value::Object(statistics)) = serde_json::to_value(statistics) {

@@ -4,12 +4,12 @@ use rayon::prelude::*;
 
 use crate::control::Control;
 use crate::error::Result;
-use crate::surface::ParametricSurface;
-use crate::surface::{BLOCK, JetBlock, Lanes, SurfaceJets};
+use crate::surface::Surface;
+use crate::surface::{BLOCK, Block, JetBlock, Lanes, SpaceLanes};
 
 /// A surface cut into regions.
 pub(super) struct Cut<'a> {
-    pub(super) surface: &'a dyn ParametricSurface,
+    pub(super) surface: &'a dyn Surface,
     pub(super) cols: usize,
     pub(super) rows: usize,
     pub(super) periodic: [bool; 2],
@@ -23,7 +23,7 @@ pub(super) struct Run<'a> {
     /// Column and row of the first.
     pub(super) node: [usize; 2],
     pub(super) labels: &'a [Option<u32>],
-    pub(super) jets: SurfaceJets,
+    pub(super) jets: SpaceLanes,
 }
 
 /// What is added up over the nodes of a region.
@@ -45,34 +45,18 @@ impl Run<'_> {
 impl Cut<'_> {
     /// Goes through the nodes of [`BLOCK`] rows, run by run: from left to right in each row.
     pub(super) fn visit(&self, first: usize, control: &Control, mut visit: impl FnMut(&Run<'_>)) {
-        let rows = first..self.rows.min(first + BLOCK);
-        let mut run = Run { node: [0; 2], labels: &[], jets: SurfaceJets::default() };
-        let labels = |[col, row]: [usize; 2]| {
-            &self.labels[row * self.cols..][col..self.cols.min(col + BLOCK)]
-        };
-        if let Some(heights) = self.surface.as_heights() {
-            let mut block = JetBlock::default();
-            for col in (0..self.cols).step_by(BLOCK) {
-                if control.cancel.is_cancelled() {
-                    return;
-                }
-                heights.block_jets(col, first, &mut block);
-                for row in rows.clone() {
-                    (run.node, run.labels) = ([col, row], labels([col, row]));
-                    run.jets.load_heights(&block, row - first, heights.frame().spacing(row as f64));
-                    visit(&run);
-                }
-            }
-            return;
-        }
-        for row in rows {
+        let mut run = Run { node: [0; 2], labels: &[], jets: SpaceLanes::default() };
+        let mut jets = JetBlock::default();
+        for col in (0..self.cols).step_by(BLOCK) {
             if control.cancel.is_cancelled() {
                 return;
             }
-            let jets = self.surface.row_space_jets(row);
-            for (col, jets) in (0..self.cols).step_by(BLOCK).zip(jets.chunks(BLOCK)) {
-                (run.node, run.labels) = ([col, row], labels([col, row]));
-                run.jets.load(jets);
+            let block = Block::from(self.surface, col, first);
+            self.surface.block_jets(&block, &mut jets);
+            for (j, row) in block.rows.enumerate() {
+                run.node = [col, row];
+                run.labels = &self.labels[row * self.cols..][block.cols.clone()];
+                run.jets.load(&jets, j, self.surface.axes(row as f64));
                 visit(&run);
             }
         }

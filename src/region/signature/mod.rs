@@ -24,7 +24,7 @@ use self::tensors::Tensors;
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::linalg::simd;
-use crate::surface::ParametricSurface;
+use crate::surface::Surface;
 
 /// Eigenvalues of the covariance of the neighbour differences over a region, largest first, 0 or more.
 ///
@@ -82,7 +82,7 @@ impl Signature {
 /// # Errors
 /// [`Error::Usage`] if the labels do not fit the surface; [`Error::Cancelled`].
 pub fn signatures(
-    surface: &dyn ParametricSurface,
+    surface: &dyn Surface,
     labels: &[Option<u32>],
     neighbours: Neighbours,
     control: &Control,
@@ -119,7 +119,7 @@ mod tests {
 
     use super::*;
     use crate::linalg::Sym2;
-    use crate::surface::{FitOptions, HeightSurface, SurfaceJet};
+    use crate::surface::{FitOptions, HeightSurface, Jet, SurfaceJet};
     use crate::synthetic::{Synthetic, SyntheticKind};
     use crate::terrain::Crs;
 
@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    impl ParametricSurface for Bumps {
+    impl Surface for Bumps {
         fn cols(&self) -> usize {
             self.nodes
         }
@@ -197,18 +197,18 @@ mod tests {
             self.nodes
         }
 
-        fn space_jet(&self, at: DVec2) -> SurfaceJet {
+        fn jet(&self, at: DVec2) -> Jet {
             let [x, x1, x2, x11, x12, x22] = self.plan(at);
             let (z, gradient, hessian) = self.height(x);
             let first = |a: DVec2| a.extend(gradient.dot(a)) * self.scale;
             let second = |a: DVec2, b: DVec2, ab: DVec2| {
                 ab.extend(gradient.dot(ab) + a.dot(hessian.apply(b))) * self.scale
             };
-            SurfaceJet {
+            Jet::Space(SurfaceJet {
                 point: x.extend(z) * self.scale,
                 first: [first(x1), first(x2)],
                 second: [second(x1, x1, x11), second(x1, x2, x12), second(x2, x2, x22)],
-            }
+            })
         }
     }
 
@@ -257,7 +257,7 @@ mod tests {
     /// A torus around the z axis with tube radius 1, closed both ways, or a sphere if the ring's radius is 0.
     struct Torus(f64);
 
-    impl ParametricSurface for Torus {
+    impl Surface for Torus {
         fn cols(&self) -> usize {
             64
         }
@@ -270,13 +270,13 @@ mod tests {
             [true; 2]
         }
 
-        fn space_jet(&self, at: DVec2) -> SurfaceJet {
+        fn jet(&self, at: DVec2) -> Jet {
             use std::f64::consts::TAU;
             let rate = DVec2::new(TAU / 64.0, TAU / 48.0);
             let (around, along) = (DVec2::from_angle(at.x * rate.x), at.y * rate.y);
             let (radius, height) = (self.0 + along.cos(), along.sin());
             let ring = |r: f64, z: f64| (around * r).extend(z);
-            SurfaceJet {
+            Jet::Space(SurfaceJet {
                 point: ring(radius, height),
                 first: [
                     (around.perp() * radius * rate.x).extend(0.0),
@@ -287,14 +287,11 @@ mod tests {
                     (around.perp() * -along.sin() * rate.x * rate.y).extend(0.0),
                     ring(-along.cos(), -along.sin()) * (rate.y * rate.y),
                 ],
-            }
+            })
         }
     }
 
-    fn of_all(
-        surface: &impl ParametricSurface,
-        label: impl Fn(usize) -> Option<u32>,
-    ) -> Vec<Signature> {
+    fn of_all(surface: &impl Surface, label: impl Fn(usize) -> Option<u32>) -> Vec<Signature> {
         let labels: Vec<_> = (0..surface.cols() * surface.rows()).map(label).collect();
         signatures(surface, &labels, Neighbours::Surface, &Control::default()).unwrap()
     }
@@ -302,7 +299,7 @@ mod tests {
     /// A height surface that does not say that it is one.
     struct Unsaid(HeightSurface);
 
-    impl ParametricSurface for Unsaid {
+    impl Surface for Unsaid {
         fn cols(&self) -> usize {
             self.0.cols()
         }
@@ -311,8 +308,8 @@ mod tests {
             self.0.rows()
         }
 
-        fn space_jet(&self, at: DVec2) -> SurfaceJet {
-            self.0.space_jet(at)
+        fn jet(&self, at: DVec2) -> Jet {
+            Jet::Space(self.0.space_jet(at))
         }
     }
 

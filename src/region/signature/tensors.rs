@@ -11,7 +11,7 @@ use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::bilinear::{CORNERS, corner_weights};
 use crate::linalg::simd::{self, Kernel};
-use crate::metric::of_surface;
+use crate::metric::curvature_in_space;
 use crate::surface::SurfaceJet;
 use crate::surface::{BLOCK, Lanes};
 
@@ -169,7 +169,7 @@ impl Kernel for CurvatureTensors<'_> {
 /// `C = Σ v_i v_iᵀ / (δ+|κ_i|) = J D Jᵀ` in space.
 #[inline(always)]
 fn curvature_tensor(jet: &SurfaceJet, delta: f64) -> Tensor {
-    let d = of_surface(jet, delta);
+    let d = curvature_in_space(jet, delta);
     let [a, b] = jet.first.map(|s| s.to_array());
     let entry = |i: usize, j: usize| {
         d.xx * a[i] * a[j] + d.xy * (a[i] * b[j] + b[i] * a[j]) + d.yy * b[i] * b[j]
@@ -183,7 +183,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::surface::SurfaceJets;
+    use crate::surface::SpaceLanes;
 
     #[test]
     fn wide_registers_change_no_bit() {
@@ -197,8 +197,8 @@ mod tests {
             }
         };
         let plain: Vec<SurfaceJet> = (0..BLOCK).map(jet).collect();
-        let mut jets = SurfaceJets::default();
-        jets.load(&plain);
+        let mut jets = SpaceLanes::default();
+        jets.load_row(&plain);
         let run = Run { node: [0; 2], labels: &[], jets };
         let mut tensors = [[0.0; 6]; BLOCK];
         let deltas = &[0.3; BLOCK];

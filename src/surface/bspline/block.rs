@@ -22,7 +22,7 @@ pub(crate) type Lanes = [f64; BLOCK];
 ///
 /// Nodes beyond the last column or row of the grid mean nothing.
 #[derive(Clone, Debug)]
-pub(crate) struct JetBlock {
+pub(crate) struct HeightBlock {
     z: [Lanes; BLOCK],
     zx: [Lanes; BLOCK],
     zy: [Lanes; BLOCK],
@@ -33,7 +33,7 @@ pub(crate) struct JetBlock {
     lines: [Contracted; LINES],
 }
 
-impl Default for JetBlock {
+impl Default for HeightBlock {
     fn default() -> Self {
         let zero = [[0.0; BLOCK]; BLOCK];
         let lines = [[[0.0; BLOCK]; 3]; LINES];
@@ -41,7 +41,7 @@ impl Default for JetBlock {
     }
 }
 
-impl JetBlock {
+impl HeightBlock {
     /// The jet in column `i` of row `row` of the block.
     #[inline(always)]
     pub(crate) fn jet(&self, row: usize, i: usize) -> HeightJet {
@@ -53,6 +53,17 @@ impl JetBlock {
             zxy: self.zxy[row][i],
             zyy: self.zyy[row][i],
         }
+    }
+
+    /// Gives the node in column `i` of row `row` of the block a jet.
+    pub(in crate::surface) fn set(&mut self, row: usize, i: usize, jet: &HeightJet) {
+        let HeightJet { z, zx, zy, zxx, zxy, zyy } = *jet;
+        self.z[row][i] = z;
+        self.zx[row][i] = zx;
+        self.zy[row][i] = zy;
+        self.zxx[row][i] = zxx;
+        self.zxy[row][i] = zxy;
+        self.zyy[row][i] = zyy;
     }
 }
 
@@ -70,7 +81,7 @@ impl Fit {
         per_metre: &[DVec2],
         col: usize,
         rows: Range<usize>,
-        jets: &mut JetBlock,
+        jets: &mut HeightBlock,
     ) {
         let nodes = &self.y.nodes[rows.clone()];
         let (Some(top), Some(bottom)) = (nodes.first(), nodes.last()) else { return };
@@ -145,7 +156,7 @@ struct RowJets<'a> {
     node: &'a Local,
     per_metre: DVec2,
     row: usize,
-    jets: &'a mut JetBlock,
+    jets: &'a mut HeightBlock,
 }
 
 impl Kernel for RowJets<'_> {
@@ -192,11 +203,11 @@ mod tests {
             let plan = Plan::every_node(&frame, degree);
             let fit = Fit::new(&frame, &heights, &plan, &Control::default()).unwrap();
             assert!(fit.x.uniform.contains(&16) && fit.x.uniform.contains(&31));
-            let mut jets = JetBlock::default();
+            let mut jets = HeightBlock::default();
             fit.jets(&[DVec2::ONE; 21], 16, 2..18, &mut jets);
             let count = 16 + fit.y.basis.support() - 1;
             let lines = &fit.coefficients[fit.y.nodes[2].start * 53..][..count * 53];
-            let mut plain = JetBlock::default().lines;
+            let mut plain = HeightBlock::default().lines;
             contract_any(lines, &fit.x, 16, &mut plain);
             assert_eq!(jets.lines[..count], plain[..count]);
         }

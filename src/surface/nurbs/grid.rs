@@ -4,7 +4,8 @@ use glam::DVec2;
 
 use super::{Basis, NurbsSurface, SMALL, size};
 use crate::error::{Error, Result};
-use crate::surface::parametric::{Measures, ParametricSurface, SurfaceJet, measured};
+use crate::surface::measures::measured;
+use crate::surface::{Block, Jet, JetBlock, Measures, Surface, SurfaceJet};
 
 /// A [`NurbsSurface`] whose parameters are those of a grid: equal steps of the surface's own, from end to end of its domain or,
 /// where it is closed, once round.
@@ -109,7 +110,7 @@ impl NurbsGrid {
     }
 }
 
-impl ParametricSurface for NurbsGrid {
+impl Surface for NurbsGrid {
     fn cols(&self) -> usize {
         self.nodes[0]
     }
@@ -131,13 +132,18 @@ impl ParametricSurface for NurbsGrid {
         measured(self, |col, row| !is_pole(0, col) && !is_pole(1, row))
     }
 
-    fn space_jet(&self, at: DVec2) -> SurfaceJet {
+    fn jet(&self, at: DVec2) -> Jet {
         let u = DVec2::new(self.parameter(0, at.x), self.parameter(1, at.y));
-        self.by_nodes(self.surface.jet(u))
+        Jet::Space(self.by_nodes(self.surface.jet(u)))
     }
 
-    fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
-        let jets = self.surface.row_jets(&self.columns, self.parameter(1, row as f64));
-        jets.map(|jet| self.by_nodes(jet)).collect()
+    fn block_jets(&self, block: &Block, jets: &mut JetBlock) {
+        let columns = &self.columns[block.cols.clone()];
+        for (j, row) in block.rows.clone().enumerate() {
+            let row = self.surface.row_jets(columns, self.parameter(1, row as f64));
+            for (i, jet) in row.enumerate() {
+                jets.set(j, i, Jet::Space(self.by_nodes(jet)));
+            }
+        }
     }
 }

@@ -124,8 +124,11 @@ impl NurbsSurface {
         columns: &'a [Basis],
         u2: f64,
     ) -> impl Iterator<Item = SurfaceJet> + 'a {
-        let line = self.line(&self.knots[1].basis(self.turned(1, u2)), 0..self.knots[0].controls());
-        columns.iter().map(move |basis| self.jet_on(basis, &line[basis.first..]))
+        let least = columns.iter().map(|basis| basis.first).min().unwrap_or(0);
+        let most = columns.iter().map(|basis| basis.first).max().unwrap_or(0);
+        let controls = least..most + self.knots[0].degree() + 1;
+        let line = self.line(&self.knots[1].basis(self.turned(1, u2)), controls);
+        columns.iter().map(move |basis| self.jet_on(basis, &line[basis.first - least..]))
     }
 
     /// In a closed direction the same parameter in the domain.

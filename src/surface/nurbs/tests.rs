@@ -2,8 +2,9 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::control::Control;
-use crate::metric::Metric;
-use crate::surface::ParametricSurface;
+use crate::eikonal::TensorField;
+use crate::metric::{Curvature, Metric, Modifiers};
+use crate::surface::Surface;
 
 /// A half circle of radius 2 about the origin from the top of the z axis to its bottom.
 fn meridian() -> NurbsCurve {
@@ -268,7 +269,8 @@ proptest! {
         let again = NurbsSurface::from_json(&surface.to_json()).unwrap();
         prop_assert!(again.jet(DVec2::ONE).point.distance(surface.jet(DVec2::ONE).point) < 1e-12);
         let grid = surface.on_grid(5, 4).unwrap();
-        let metric = Metric::Curvature(Default::default()).on_surface(&grid, &Control::default()).unwrap();
-        metric.sample(&Control::default()).unwrap();
+        let (none, control) = (Modifiers::default(), Control::default());
+        let metric = Curvature::default().on(&grid, &none, &control).unwrap();
+        TensorField::sample(&metric, &control).unwrap();
     }
 }

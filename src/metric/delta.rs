@@ -1,0 +1,62 @@
+//! The offset beside a curvature.
+
+use crate::error::{Error, Result};
+use crate::surface::{Measures, Surface};
+
+/// What bends by no more than this, as curvature times extent, is a plane. A plane of 4000² cells of 30 m with heights in `f32` is fitted,
+/// by the defaults, with 5e-4 of rounding.
+pub(crate) const PLANE_BEND: f64 = 1e-3;
+
+/// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Delta {
+    /// This share of the root-mean-square curvature of the surface. Scaling a terrain then scales `D` by a
+    /// constant and changes no route. On a plane `1/extent` instead, both from [`Surface::measures`]: any `δ` gives the same routes there. A plane
+    /// is what bends by less than 1e-3 over its extent: heights of four bytes make no better one.
+    Auto(f64),
+    /// An absolute curvature in 1/m.
+    Absolute(f64),
+}
+
+impl Delta {
+    /// Default share of the root-mean-square curvature.
+    pub const DEFAULT_SHARE: f64 = 0.1;
+
+    /// The number that the user gave.
+    ///
+    /// # Errors
+    /// It is not positive and finite.
+    pub(super) fn number(self) -> Result<f64> {
+        let (value, what) = match self {
+            Self::Absolute(delta) => (delta, "delta"),
+            Self::Auto(share) => (share, "the share of the curvature that delta is to be"),
+        };
+        if value.is_finite() && value > 0.0 {
+            Ok(value)
+        } else {
+            Err(Error::usage(format!("{what} is {value}; it must be positive and finite")))
+        }
+    }
+
+    /// The offset on a surface, 1/m; measures it if the offset is a share.
+    ///
+    /// # Errors
+    /// As [`number`](Self::number).
+    pub(super) fn on(self, surface: &dyn Surface) -> Result<f64> {
+        let number = self.number()?;
+        Ok(match self {
+            Self::Absolute(_) => number,
+            Self::Auto(_) => {
+                let Measures { rms_curvature, extent, .. } = surface.measures();
+                let is_plane = rms_curvature * extent <= PLANE_BEND;
+                if is_plane { extent.recip() } else { number * rms_curvature }
+            }
+        })
+    }
+}
+
+impl Default for Delta {
+    fn default() -> Self {
+        Self::Auto(Self::DEFAULT_SHARE)
+    }
+}

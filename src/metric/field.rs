@@ -1,0 +1,185 @@
+//! A metric on a surface.
+
+use std::fmt;
+use std::mem;
+
+use glam::DVec2;
+
+use super::modifiers::{Bound, Modifiers};
+use super::{Metric, Norm, Parameter, SpeedBlock, SpeedTensor, Unit};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::linalg::Sym2;
+use crate::surface::{BLOCK, Block, Jet, Surface};
+
+/// A metric bound to a surface, with modifiers: what a step costs everywhere, and where one may go.
+#[derive(Clone)]
+pub struct MetricField<'a> {
+    surface: &'a dyn Surface,
+    name: String,
+    unit: Unit,
+    norm: Norm,
+    modifiers: Bound,
+}
+
+impl<'a> MetricField<'a> {
+    pub(super) fn new(
+        metric: &(impl Metric + ?Sized),
+        surface: &'a dyn Surface,
+        modifiers: &Modifiers,
+        control: &Control,
+    ) -> Result<Self> {
+        let norm = metric.norm(surface, control)?;
+        let modifiers = modifiers.on(surface)?;
+        let unit = modifiers.unit(metric.unit());
+        Ok(Self { surface, name: metric.name().to_owned(), unit, norm, modifiers })
+    }
+
+    /// The surface.
+    #[must_use]
+    pub fn surface(&self) -> &'a dyn Surface {
+        self.surface
+    }
+
+    /// Name of the metric.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Unit of the distance: the metric's, but [`Unit::Ag`] for metres with a climb weight or costs.
+    #[must_use]
+    pub fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    /// The numbers that say which metric it is, beside its name.
+    #[must_use]
+    pub fn parameters(&self) -> &[Parameter] {
+        self.norm.parameters()
+    }
+
+    /// The parameter of this name, if the metric has it.
+    #[must_use]
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        let parameter = self.parameters().iter().find(|parameter| parameter.name == name);
+        parameter.map(|parameter| parameter.value)
+    }
+
+    /// See [`Norm::with_level`].
+    #[must_use]
+    pub fn level(&self) -> Option<f64> {
+        self.norm.level()
+    }
+
+    /// See [`Norm::with_seed_ranks`].
+    pub(crate) fn own_seed_ranks(&self) -> Option<&[f64]> {
+        self.norm.seed_ranks()
+    }
+
+    /// Whether the node may be entered: no void, no barrier, not too steep, and with a tensor if the metric is given by them.
+    #[must_use]
+    pub fn is_open(&self, col: usize, row: usize) -> bool {
+        let has_tensor = self.norm.tensor().is_none_or(|tensor| tensor.is_open(col, row));
+        has_tensor && self.modifiers.is_open(col, row)
+    }
+
+    /// Speed tensor `D` in the [axes](Surface::axes) of the surface at grid coordinates, from its exact derivatives there.
+    /// Where closed, that of the continued surface. `None` where there is none, and on a metric without a quadratic form.
+    #[must_use]
+    pub fn speed(&self, at: DVec2) -> Option<Sym2> {
+        let tensor = self.norm.tensor()?;
+        let speed = self.speed_of(tensor, at, &self.surface.jet(at));
+        speed.is_positive_definite().then_some(speed)
+    }
+
+    fn speed_of(&self, tensor: &dyn SpeedTensor, at: DVec2, jet: &Jet) -> Sym2 {
+        self.modifiers.speed(tensor.speed_and_det(at, jet), at, jet)
+    }
+
+    /// Cost under this metric of a step `by` (grid coordinates) around grid coordinates `at`: `√(vᵀ M v)` with
+    /// `v` in the axes of the surface, or `F(at, v)` if the metric has no quadratic form.
+    #[must_use]
+    pub fn step_cost(&self, at: DVec2, by: DVec2) -> f64 {
+        let (jet, v) = (self.surface.jet(at), by * self.surface.axes(at.y));
+        match self.norm.tensor() {
+            Some(tensor) => self.speed_of(tensor, at, &jet).inverse().norm(v),
+            None => self.modifiers.cost(self.norm.cost(at, &jet, v), at, &jet, v),
+        }
+    }
+
+    /// Length under this metric of a polyline in grid coordinates: `∫ F` by Gauss's two points on pieces of at most half a
+    /// cell.
+    #[must_use]
+    pub fn length(&self, line: &[DVec2]) -> f64 {
+        length_along(line, |at, by| self.step_cost(at, by))
+    }
+
+    /// Metric `M` in grid coordinates at grid coordinates `at`: a small grid step `by` costs `√(byᵀ M by)`. Not finite where
+    /// there is none.
+    pub(crate) fn grid_metric(&self, at: DVec2) -> Sym2 {
+        let Some(tensor) = self.norm.tensor() else { return Sym2::NAN };
+        let speed = self.speed_of(tensor, at, &self.surface.jet(at));
+        speed.inverse().stretched(self.surface.axes(at.y))
+    }
+
+    /// # Errors
+    /// The metric has no quadratic form.
+    pub(crate) fn check_quadratic(&self) -> Result<()> {
+        match self.norm.tensor() {
+            Some(_) => Ok(()),
+            None => Err(Error::usage(format!(
+                "the metric {} has no quadratic form: a step and the step back may cost differently; distances and routes are \
+                 computed on metrics that are given by a speed tensor",
+                self.name
+            ))),
+        }
+    }
+
+    /// Speed tensors at the nodes of the block whose first is `(col, row)`; nodes beyond the grid are closed.
+    pub(crate) fn block_speeds(&self, col: usize, row: usize, speeds: &mut SpeedBlock) {
+        let Some(tensor) = self.norm.tensor() else {
+            *speeds = SpeedBlock::default();
+            return;
+        };
+        let block = Block::from(self.surface, col, row);
+        let mut jets = mem::take(&mut speeds.jets);
+        self.surface.block_jets(&block, &mut jets);
+        tensor.block(&block, &jets, speeds);
+        self.modifiers.apply(&block, &jets, speeds);
+        speeds.jets = jets;
+        for (j, det) in speeds.det.iter_mut().enumerate() {
+            let cols = if j < block.rows.len() { block.cols.len() } else { 0 };
+            det[cols..BLOCK].fill(0.0);
+        }
+    }
+}
+
+impl fmt::Debug for MetricField<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("MetricField")
+            .field("name", &self.name)
+            .field("unit", &self.unit)
+            .field("norm", &self.norm)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Length of a polyline in grid coordinates by Gauss's two points on pieces of at most half a cell, where a step `by`
+/// around `at` costs `cost(at, by)`.
+pub(crate) fn length_along(line: &[DVec2], cost: impl Fn(DVec2, DVec2) -> f64) -> f64 {
+    // The points lie 1/√12 of the piece on either side of its middle.
+    const ASIDE: f64 = 0.288_675_134_594_812_9;
+    line.windows(2)
+        .map(|ends| {
+            let pieces = (2.0 * ends[0].distance(ends[1])).ceil().max(1.0);
+            let by = (ends[1] - ends[0]) / pieces;
+            (0..pieces as usize)
+                .map(|i| {
+                    let middle = ends[0] + by * (i as f64 + 0.5);
+                    0.5 * (cost(middle - by * ASIDE, by) + cost(middle + by * ASIDE, by))
+                })
+                .sum::<f64>()
+        })
+        .sum()
+}

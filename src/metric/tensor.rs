@@ -1,0 +1,72 @@
+//! The user's own speed tensors.
+
+use std::sync::Arc;
+
+use super::nodes::{NodeTensors, Nodes};
+use super::{Metric, MetricOptions, NamedMetric, Norm, Unit};
+use crate::control::Control;
+use crate::error::{Error, Result};
+use crate::linalg::Sym2;
+use crate::surface::Surface;
+
+pub(super) const NAMED: NamedMetric = NamedMetric {
+    name: "tensor",
+    about: "Your own speed tensors at the nodes, in AG units",
+    make: |options: &MetricOptions| match &options.tensors {
+        Some(tensors) => Ok(Box::new(Tensor { tensors: Arc::clone(tensors) })),
+        None => Err(Error::usage("the metric `tensor` needs the tensors at the nodes")),
+    },
+};
+
+/// Speed tensors `D` of any origin at the nodes, bilinear between them.
+#[derive(Clone, Debug)]
+pub struct Tensor {
+    /// Row-major from the first node, in the [axes](Surface::axes) of the surface: on heights ground axes (x east, y north), in
+    /// space grid coordinates. A node whose tensor is not finite is a barrier.
+    pub tensors: Arc<[Sym2]>,
+}
+
+impl Metric for Tensor {
+    fn name(&self) -> &str {
+        NAMED.name
+    }
+
+    fn unit(&self) -> Unit {
+        Unit::Ag
+    }
+
+    /// # Errors
+    /// Tensors that are not one per node; one that is finite but not positive definite.
+    fn norm(&self, surface: &dyn Surface, _: &Control) -> Result<Norm> {
+        check_tensors(surface, &self.tensors)?;
+        let tensors = Arc::clone(&self.tensors);
+        Ok(Norm::quadratic(NodeTensors { nodes: Nodes::of(surface), tensors }))
+    }
+}
+
+fn check_tensors(surface: &dyn Surface, tensors: &[Sym2]) -> Result<()> {
+    let (cols, rows) = (surface.cols(), surface.rows());
+    if tensors.len() != cols * rows {
+        return Err(Error::usage(format!(
+            "the tensor raster has {} cells, the surface {cols} columns × {rows} rows; they must cover the same grid",
+            tensors.len()
+        )));
+    }
+    let finite = |d: &Sym2| d.xx.is_finite() && d.xy.is_finite() && d.yy.is_finite();
+    match tensors.iter().position(|d| finite(d) && !d.is_positive_definite()) {
+        None => Ok(()),
+        Some(i) => {
+            let d = tensors[i];
+            Err(Error::usage(format!(
+                "the tensor D = [{} {}; {} {}] at column {}, row {} is not positive definite; every speed \
+                 tensor needs D11 > 0 and D11·D22 > D12² (use NaN for barriers)",
+                d.xx,
+                d.xy,
+                d.xy,
+                d.yy,
+                i % cols,
+                i / cols
+            )))
+        }
+    }
+}

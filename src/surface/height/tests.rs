@@ -1,0 +1,485 @@
+//! Fits against closed forms.
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::grid::Ground;
+
+const DEGREES: [Degree; 2] = [Degree::Cubic, Degree::Quintic];
+
+/// Cells of 1 m by 1 m.
+fn unit_frame(cols: usize, rows: usize) -> GridFrame {
+    GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap()
+}
+
+/// Samples `z(column, row)`.
+fn sample(frame: &GridFrame, z: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    let (cols, rows) = (frame.cols(), frame.rows());
+    (0..cols * rows).map(|i| z((i % cols) as f64, (i / cols) as f64)).collect()
+}
+
+fn fit(frame: &GridFrame, heights: &[f64], degree: Degree, smoothing: Smoothing) -> HeightSurface {
+    let options = FitOptions { degree, smoothing };
+    HeightSurface::fit_heights(frame.clone(), heights, &options, &Control::default()).unwrap()
+}
+
+fn fit_row(heights: &[f64], smoothing: Smoothing) -> HeightSurface {
+    fit(&unit_frame(heights.len(), 1), heights, Degree::Cubic, smoothing)
+}
+
+/// Uniform noise in −0.5 … 0.5 (Knuth's 64-bit generator).
+fn noise(count: usize) -> Vec<f64> {
+    let mut state = 1_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+fn jets(surface: &HeightSurface) -> Vec<HeightJet> {
+    let mut jets = vec![HeightJet::default(); surface.frame.nodes()];
+    for (row, jets) in jets.chunks_mut(surface.frame.cols()).enumerate() {
+        surface.row_jets(row, jets);
+    }
+    jets
+}
+
+fn largest_difference(a: &HeightJet, b: &HeightJet) -> f64 {
+    let parts = |j: &HeightJet| [j.z, j.zx, j.zy, j.zxx, j.zxy, j.zyy];
+    parts(a).iter().zip(parts(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn interpolation_reproduces_polynomials_of_its_degree_up_to_the_border() {
+    for (degree, p) in [(Degree::Cubic, 3), (Degree::Quintic, 5)] {
+        let frame =
+            GridFrame::new(23, 17, DVec2::ZERO, DVec2::new(2.0, 5.0), Ground::METRES).unwrap();
+        // z = (x/20)^p (y/40)^p with x east and y north: row = −y/5.
+        let z = |x: f64, y: f64| (x / 20.0).powi(p) * (y / 40.0).powi(p);
+        let heights = sample(&frame, |c, r| z(2.0 * c, -5.0 * r));
+        let surface = fit(&frame, &heights, degree, Smoothing::Interpolate);
+        assert!(surface.residuals().max < 1e-10, "{:?}", surface.residuals());
+        let power = |t: f64, scale: f64, order: i32| -> f64 {
+            let factor: i32 = (0..order).map(|i| p - i).product();
+            f64::from(factor) * (t / scale).powi(p - order) / scale.powi(order)
+        };
+        for at in
+            [DVec2::ZERO, DVec2::new(22.0, 16.0), DVec2::new(0.3, 15.9), DVec2::new(11.2, 7.7)]
+        {
+            let (x, y) = (2.0 * at.x, -5.0 * at.y);
+            let d = |i: i32, j: i32| power(x, 20.0, i) * power(y, 40.0, j);
+            let exact = HeightJet {
+                z: d(0, 0),
+                zx: d(1, 0),
+                zy: d(0, 1),
+                zxx: d(2, 0),
+                zxy: d(1, 1),
+                zyy: d(0, 2),
+            };
+            let difference = largest_difference(&surface.jet(at), &exact);
+            assert!(difference < 1e-9, "{degree:?} at {at}: {difference:e}");
+            let third = surface.third_derivatives(at);
+            for (got, want) in third.into_iter().zip([d(3, 0), d(2, 1), d(1, 2), d(0, 3)]) {
+                assert!((got - want).abs() < 1e-8, "{degree:?} at {at}: {third:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn interpolation_converges_with_full_order_in_the_interior_and_at_the_border() {
+    let exact = |x: f64, y: f64| HeightJet {
+        z: (3.0 * x).sin() * (2.0 * y).cos(),
+        zx: 3.0 * (3.0 * x).cos() * (2.0 * y).cos(),
+        zy: -2.0 * (3.0 * x).sin() * (2.0 * y).sin(),
+        zxx: -9.0 * (3.0 * x).sin() * (2.0 * y).cos(),
+        zxy: -6.0 * (3.0 * x).cos() * (2.0 * y).sin(),
+        zyy: -4.0 * (3.0 * x).sin() * (2.0 * y).cos(),
+    };
+    for (degree, p) in [(Degree::Cubic, 3), (Degree::Quintic, 5)] {
+        for region in ["interior", "border"] {
+            let errors: Vec<[f64; 3]> = [20, 40, 80, 160]
+                .map(|n| {
+                    let h = 1.0 / n as f64;
+                    let frame =
+                        GridFrame::new(n + 1, n + 1, DVec2::ZERO, DVec2::splat(h), Ground::METRES)
+                            .unwrap();
+                    let heights = sample(&frame, |c, r| exact(c * h, -r * h).z);
+                    let surface = fit(&frame, &heights, degree, Smoothing::Interpolate);
+                    let mut errors = [0.0_f64; 3];
+                    for i in 0..=64 {
+                        let s = i as f64 / 64.0;
+                        let place = if region == "border" {
+                            DVec2::new(0.37 * h, 0.1 + 0.8 * s)
+                        } else {
+                            DVec2::new(0.3 + 0.4 * s, 0.61 - 0.2 * s)
+                        };
+                        let (got, want) = (surface.jet(place / h), exact(place.x, -place.y));
+                        let pairs = [
+                            (got.z - want.z).abs(),
+                            (got.zx - want.zx).abs().max((got.zy - want.zy).abs()),
+                            (got.zxx - want.zxx)
+                                .abs()
+                                .max((got.zyy - want.zyy).abs())
+                                .max((got.zxy - want.zxy).abs()),
+                        ];
+                        errors.iter_mut().zip(pairs).for_each(|(e, p)| *e = e.max(p));
+                    }
+                    errors
+                })
+                .to_vec();
+            for order in 0..3 {
+                let expected = f64::from(p + 1 - order);
+                for pair in errors.windows(2) {
+                    let (coarse, fine) = (pair[0][order as usize], pair[1][order as usize]);
+                    let observed = (coarse / fine).log2();
+                    assert!(
+                        observed > expected - 0.4 || fine < 1e-11 * 160_f64.powi(order),
+                        "{degree:?}, {region}, derivative {order}: {coarse:e} to {fine:e}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn waves_of_the_cutoff_length_keep_half_their_amplitude() {
+    for degree in DEGREES {
+        for cells in [2.5, 4.0, 8.0, 16.0, 40.0, 123.4] {
+            // Ten whole waves in the middle of thirty, whole numbers of nodes.
+            let wave = (10.0 * cells) as usize;
+            let heights: Vec<f64> = (0..3 * wave).map(|i| (TAU * i as f64 / cells).cos()).collect();
+            let surface =
+                fit(&unit_frame(3 * wave, 1), &heights, degree, Smoothing::CutoffCells(cells));
+            let middle = wave..2 * wave;
+            let product: f64 =
+                middle.map(|i| surface.height(DVec2::new(i as f64, 0.0)) * heights[i]).sum();
+            let response = 2.0 * product / wave as f64;
+            assert!((response - 0.5).abs() < 0.002, "{degree:?}, {cells} cells: {response}");
+            let column =
+                fit(&unit_frame(1, heights.len()), &heights, degree, Smoothing::Cutoff(cells));
+            for i in [0, wave, 2 * wave + 1] {
+                let i = i as f64;
+                let (a, b) =
+                    (surface.height(DVec2::new(i, 0.0)), column.height(DVec2::new(0.0, i)));
+                assert!((a - b).abs() < 1e-12);
+            }
+        }
+    }
+}
+
+#[test]
+fn smoothing_keeps_quadratics_for_any_cutoff() {
+    let frame = unit_frame(40, 31);
+    let z = |c: f64, r: f64| 3.0 + 0.4 * c - 0.1 * r + 0.01 * c * c - 0.02 * c * r + 0.03 * r * r;
+    let heights = sample(&frame, z);
+    for degree in DEGREES {
+        for cells in [1e-6, 2.0, 16.0, 100.0, 1e4, 1e12] {
+            let surface = fit(&frame, &heights, degree, Smoothing::CutoffCells(cells));
+            for (col, row) in [(0, 0), (39, 0), (20, 15), (39, 30)] {
+                let jet = surface.jet(DVec2::new(col as f64, row as f64));
+                let (c, r) = (col as f64, row as f64);
+                let exact = HeightJet {
+                    z: z(c, r),
+                    zx: 0.4 + 0.02 * c - 0.02 * r,
+                    zy: 0.1 + 0.02 * c - 0.06 * r,
+                    zxx: 0.02,
+                    zxy: 0.02,
+                    zyy: 0.06,
+                };
+                let difference = largest_difference(&jet, &exact);
+                // The condition of the equations costs some digits at long cut-offs.
+                let tolerance = if cells < 1e3 { 1e-8 } else { 1e-5 };
+                assert!(difference < tolerance, "{degree:?}, {cells}: {difference:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn row_jets_are_the_jets_at_the_nodes() {
+    for degree in DEGREES {
+        for (cols, rows) in [(1, 1), (1, 9), (9, 1), (2, 2), (3, 5), (4, 4), (5, 6), (33, 20)] {
+            let frame = unit_frame(cols, rows);
+            let heights = sample(&frame, |c, r| (c * 0.9).sin() + (r * 0.4 + c * 0.3).cos());
+            let every = [
+                Smoothing::Interpolate,
+                Smoothing::CutoffCells(5.0),
+                Smoothing::CutoffCells(50.0),
+                Smoothing::Tolerance(0.2),
+                Smoothing::Auto,
+            ];
+            for smoothing in every {
+                let surface = fit(&frame, &heights, degree, smoothing);
+                for (i, jet) in jets(&surface).iter().enumerate() {
+                    let at = DVec2::new((i % cols) as f64, (i / cols) as f64);
+                    let difference = largest_difference(jet, &surface.jet(at));
+                    assert!(difference < 1e-12, "{degree:?} {cols}×{rows} {smoothing:?}");
+                    assert!((surface.height(at) - jet.z).abs() < 1e-12);
+                    if smoothing == Smoothing::Interpolate {
+                        assert!((jet.z - heights[i]).abs() < 1e-12);
+                    }
+                }
+                assert!(surface.rms_curvature().is_finite());
+            }
+        }
+    }
+}
+
+#[test]
+fn small_grids_have_the_polynomial_of_their_nodes() {
+    let frame = unit_frame(1, 1);
+    let one = fit(&frame, &[7.0], Degree::Cubic, Smoothing::CutoffCells(16.0));
+    assert_eq!(one.jet(DVec2::ZERO), HeightJet { z: 7.0, ..Default::default() });
+    let line = fit_row(&[1.0, 3.0], Smoothing::Interpolate);
+    let jet = line.jet(DVec2::new(0.5, 0.0));
+    assert!((jet.z - 2.0).abs() < 1e-14 && (jet.zx - 2.0).abs() < 1e-14 && jet.zxx.abs() < 1e-13);
+    let parabola = fit_row(&[0.0, 1.0, 4.0], Smoothing::Interpolate);
+    assert!((parabola.jet(DVec2::new(1.3, 0.0)).zxx - 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn sphere_cap_and_cylinder_have_their_curvature() {
+    let (radius, n) = (200.0_f64, 101);
+    let frame = unit_frame(n, n);
+    let from_middle = |t: f64| t - 50.0;
+    let cap = sample(&frame, |c, r| {
+        (radius * radius - from_middle(c).powi(2) - from_middle(r).powi(2)).sqrt()
+    });
+    let trough = sample(&frame, |c, _| -(radius * radius - from_middle(c).powi(2)).sqrt());
+    for (degree, tolerance) in [(Degree::Cubic, 2e-4), (Degree::Quintic, 1e-6)] {
+        for jet in jets(&fit(&frame, &cap, degree, Smoothing::Interpolate)) {
+            let curvature = jet.curvature();
+            for kappa in curvature.principal {
+                assert!((kappa * radius + 1.0).abs() < tolerance, "{degree:?}: {kappa}");
+            }
+        }
+        let surface = fit(&frame, &trough, degree, Smoothing::Interpolate);
+        for jet in jets(&surface) {
+            let [k1, k2] = jet.curvature().principal;
+            assert!((k1 * radius - 1.0).abs() < tolerance && (k2 * radius).abs() < tolerance);
+        }
+        assert!((surface.rms_curvature() * radius - 0.5_f64.sqrt()).abs() < tolerance);
+    }
+}
+
+#[test]
+fn degrees_give_the_curvature_of_metres() {
+    // One hill of 2 km on a degree grid at 60° N, sampled by its local metres.
+    let step = DVec2::new(2.0 / 3600.0, 1.0 / 3600.0);
+    let degrees = GridFrame::new(201, 201, DVec2::new(8.0, 60.0), step, Ground::WGS84).unwrap();
+    let spacing = degrees.mid_spacing();
+    let metres = GridFrame::new(201, 201, DVec2::ZERO, spacing, Ground::METRES).unwrap();
+    let hill = |frame: &GridFrame, c: f64, r: f64| {
+        let (x, y) = ((c - 100.0) * frame.spacing(r).x, (r - 100.0) * frame.spacing(r).y);
+        500.0 * (-(x * x + y * y) / 2e6_f64).exp()
+    };
+    for smoothing in [Smoothing::Interpolate, Smoothing::Cutoff(400.0)] {
+        let a =
+            fit(&degrees, &sample(&degrees, |c, r| hill(&degrees, c, r)), Degree::Cubic, smoothing);
+        let b =
+            fit(&metres, &sample(&metres, |c, r| hill(&metres, c, r)), Degree::Cubic, smoothing);
+        let scale = b.rms_curvature();
+        assert!((a.rms_curvature() / scale - 1.0).abs() < 1e-3);
+        let (a, b) = (jets(&a), jets(&b));
+        for (a, b) in a.iter().zip(&b) {
+            let [a, b] = [a, b].map(|jet| jet.curvature().principal);
+            assert!(
+                (a[0] - b[0]).abs() < 0.02 * scale && (a[1] - b[1]).abs() < 0.02 * scale,
+                "{a:?} {b:?} {scale}"
+            );
+        }
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let frame =
+        GridFrame::new(130, 90, DVec2::new(8.0, 47.0), DVec2::splat(1e-3), Ground::WGS84).unwrap();
+    let mut heights = noise(frame.nodes());
+    heights[40 * 130 + 20..40 * 130 + 60].fill(f64::NAN);
+    for smoothing in [Smoothing::CutoffCells(9.0), Smoothing::Tolerance(0.2), Smoothing::Auto] {
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let surface = fit(&frame, &heights, Degree::Cubic, smoothing);
+                (surface.fit.coefficients.clone(), surface.residuals(), surface.rms_curvature())
+            })
+        };
+        assert_eq!(run(1), run(7));
+    }
+}
+
+/// A 60 × 50 grid of `z` with a disc, a corner, a whole row and a whole column missing.
+fn with_voids(frame: &GridFrame, z: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    sample(frame, |c, r| {
+        let disc = (c - 25.0).hypot(r - 20.0) < 6.0;
+        let corner = c + r < 9.0;
+        if disc || corner || r == 35.0 || c == 48.0 { f64::NAN } else { z(c, r) }
+    })
+}
+
+#[test]
+fn quadratics_with_voids_are_reproduced() {
+    let frame = unit_frame(60, 50);
+    let z = |c: f64, r: f64| 100.0 + 0.3 * c - 0.2 * r + 0.01 * c * c + 0.02 * c * r - 0.03 * r * r;
+    for degree in DEGREES {
+        for smoothing in
+            [Smoothing::Interpolate, Smoothing::CutoffCells(16.0), Smoothing::Tolerance(1e-7)]
+        {
+            let surface = fit(&frame, &with_voids(&frame, z), degree, smoothing);
+            assert!(surface.is_void(25, 20) && !surface.is_void(0, 20));
+            for (i, jet) in jets(&surface).iter().enumerate() {
+                if surface.is_void(i % 60, i / 60) {
+                    continue;
+                }
+                let (c, r) = ((i % 60) as f64, (i / 60) as f64);
+                let exact = HeightJet {
+                    z: z(c, r),
+                    zx: 0.3 + 0.02 * c + 0.02 * r,
+                    zy: 0.2 - 0.02 * c + 0.06 * r,
+                    zxx: 0.02,
+                    zxy: -0.02,
+                    zyy: -0.06,
+                };
+                let difference = largest_difference(jet, &exact);
+                let tolerance = if let Smoothing::Tolerance(_) = smoothing { 1e-5 } else { 1e-8 };
+                assert!(
+                    difference < tolerance,
+                    "{degree:?} {smoothing:?} ({c}, {r}): {difference:e}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn voids_hardly_disturb_the_heights_beside_them() {
+    let frame = unit_frame(60, 50);
+    let rough = noise(frame.nodes());
+    let z = |c: f64, r: f64| {
+        20.0 * (c * 0.15).sin() * (r * 0.12).cos() + rough[(r * 60.0 + c) as usize]
+    };
+    let smoothing = Smoothing::CutoffCells(12.0);
+    let whole = jets(&fit(&frame, &sample(&frame, z), Degree::Cubic, smoothing));
+    let holed = fit(&frame, &with_voids(&frame, z), Degree::Cubic, smoothing);
+    let (mut worst, mut curvature) = (0.0_f64, 0.0_f64);
+    for (i, jet) in jets(&holed).iter().enumerate() {
+        if !holed.is_void(i % 60, i / 60) {
+            worst = worst.max((jet.z - whole[i].z).abs());
+            curvature =
+                curvature.max((jet.zxx - whole[i].zxx).abs().max((jet.zyy - whole[i].zyy).abs()));
+        }
+    }
+    // Amplitude 20 m, curvature 0.45 /m, noise of 0.29 m.
+    assert!(worst < 0.5 && curvature < 0.2, "{worst} {curvature}");
+}
+
+#[test]
+fn wide_voids_stay_within_bounds() {
+    // Half of the grid missing, on the side where elimination begins and on the other.
+    let frame = unit_frame(1500, 9);
+    let truth = sample(&frame, |c, r| 100.0 * (c * 0.05).sin() + r);
+    for missing in [0.0..900.0, 600.0..1500.0, 200.0..1400.0] {
+        let heights: Vec<f64> = (0..truth.len())
+            .map(|i| if missing.contains(&((i % 1500) as f64)) { f64::NAN } else { truth[i] })
+            .collect();
+        for degree in DEGREES {
+            for cells in [0.5, 2.0, 4.0, 7.0, 16.0, 64.0, 1e3, 1e9] {
+                let surface = fit(&frame, &heights, degree, Smoothing::CutoffCells(cells));
+                for jet in jets(&surface) {
+                    assert!(jet.z.abs() < 400.0, "{degree:?} {cells} {missing:?} {jet:?}");
+                }
+                assert!(surface.residuals().rms < 110.0);
+            }
+            let surface = fit(&frame, &heights, degree, Smoothing::Interpolate);
+            assert!(surface.residuals().max < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn a_single_height_makes_a_level_surface() {
+    let frame = unit_frame(7, 5);
+    let mut heights = vec![f64::NAN; 35];
+    heights[16] = 42.0;
+    for smoothing in [
+        Smoothing::Interpolate,
+        Smoothing::CutoffCells(16.0),
+        Smoothing::Auto,
+        Smoothing::Tolerance(1.0),
+    ] {
+        let surface = fit(&frame, &heights, Degree::Cubic, smoothing);
+        for jet in jets(&surface) {
+            assert!((jet.z - 42.0).abs() < 1e-6, "{smoothing:?} {jet:?}");
+        }
+    }
+}
+
+#[test]
+fn cross_validation_finds_the_cutoff_that_removes_the_noise() {
+    let frame = unit_frame(120, 100);
+    let truth = sample(&frame, |c, r| 10.0 * (c * 0.08).sin() * (r * 0.06).cos());
+    let heights: Vec<f64> =
+        truth.iter().zip(noise(truth.len())).map(|(z, e)| z + 3.0 * e).collect();
+    let error = |smoothing: Smoothing| {
+        let surface = fit(&frame, &heights, Degree::Cubic, smoothing);
+        let squares: f64 =
+            jets(&surface).iter().zip(&truth).map(|(jet, z)| (jet.z - z).powi(2)).sum();
+        ((squares / truth.len() as f64).sqrt(), surface.cutoff())
+    };
+    let (auto, cutoff) = error(Smoothing::Auto);
+    let cutoff = cutoff.unwrap();
+    // λ = (L/2π)⁶: a factor of ten either way.
+    let tenfold = 10_f64.powf(1.0 / 6.0);
+    assert!(auto < error(Smoothing::Cutoff(cutoff / tenfold)).0, "{cutoff}");
+    assert!(auto < error(Smoothing::Cutoff(cutoff * tenfold)).0, "{cutoff}");
+    assert!(auto < 0.25 * 3.0 / 12_f64.sqrt());
+}
+
+#[test]
+fn a_tolerance_is_met_with_fewer_coefficients() {
+    let frame = unit_frame(100, 60);
+    let heights = sample(&frame, |c, r| 10.0 * (c * 0.1).sin() * (r * 0.08).cos());
+    let mut before = 0;
+    for tolerance in [1.0, 1e-1, 1e-2, 1e-3, 1e-13] {
+        let surface = fit(&frame, &heights, Degree::Cubic, Smoothing::Tolerance(tolerance));
+        assert!(surface.residuals().rms <= tolerance, "{:?}", surface.residuals());
+        assert!(surface.coefficients() > before);
+        before = surface.coefficients();
+        if tolerance == 1e-2 {
+            assert!(before < 600, "{before}");
+        }
+    }
+}
+
+#[test]
+fn a_tolerance_is_met_on_oblong_cells() {
+    let frame = GridFrame::new(60, 30, DVec2::ZERO, DVec2::new(1.0, 50.0), Ground::METRES).unwrap();
+    let surface = fit(&frame, &noise(1800), Degree::Cubic, Smoothing::Tolerance(1e-6));
+    assert!(surface.residuals().rms <= 1e-6, "{:?}", surface.residuals());
+}
+
+#[test]
+fn impossible_wishes_are_refused() {
+    let frame = unit_frame(4, 4);
+    let fit = |heights: &[f64], smoothing| {
+        let options = FitOptions { smoothing, ..Default::default() };
+        HeightSurface::fit_heights(frame.clone(), heights, &options, &Control::default())
+    };
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for smoothing in
+            [Smoothing::Cutoff(bad), Smoothing::CutoffCells(bad), Smoothing::Tolerance(bad)]
+        {
+            assert!(matches!(fit(&[0.0; 16], smoothing), Err(Error::Usage(_))));
+        }
+    }
+    assert!(matches!(fit(&[f64::NAN; 16], Smoothing::Interpolate), Err(Error::Usage(_))));
+    let control = Control::default();
+    control.cancel.cancel();
+    let cancelled =
+        HeightSurface::fit_heights(frame.clone(), &[0.0; 16], &FitOptions::default(), &control);
+    assert!(matches!(cancelled, Err(Error::Cancelled)));
+}
