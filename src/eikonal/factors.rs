@@ -133,22 +133,26 @@ fn nearest(factors: &[Factor], tiling: &Tiling, tile: usize) -> u32 {
     let [cols, rows] = tiling.size(tile);
     let half = 0.5 * (DVec2::new(cols as f64, rows as f64) - 1.0);
     let middle = tiling.first(tile) + half;
-    let nearest_to = |at: DVec2| {
-        let length = |factor: &Factor| factor.travelled + factor.value(at - factor.at);
-        let lengths = factors.iter().map(length).enumerate();
-        lengths.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
+    let index = nearest_to(factors, middle);
+    let Factor { radius, number, .. } = factors[index];
+    if factors[index].gap(tiling, tile).length() > radius {
+        return 0;
+    }
+    // The places of one factor are convex where all are alike: the corners tell.
+    let is_same = |x: f64, y: f64| {
+        let corner = middle + DVec2::new(x, y) * (half + 1.0);
+        factors[nearest_to(factors, corner)].number == number
     };
-    let index = nearest_to(middle);
-    let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
-    let reaches = factors[index].gap(tiling, tile).length() <= factors[index].radius;
-    let alone = || {
-        // The places of one factor are convex where all are alike.
-        let corner = |(x, y)| middle + DVec2::new(x, y) * (half + 1.0);
-        let same = |other: usize| factors[other].number == factors[index].number;
-        factors.iter().all(|factor| factor.number == 0)
-            || corners.into_iter().all(|at| same(nearest_to(corner(at))))
-    };
-    if reaches && alone() { index as u32 + 1 } else { 0 }
+    let is_alone = factors.iter().all(|factor| factor.number == 0)
+        || is_same(-1.0, -1.0) && is_same(1.0, -1.0) && is_same(-1.0, 1.0) && is_same(1.0, 1.0);
+    if is_alone { index as u32 + 1 } else { 0 }
+}
+
+/// The factor that brings the least distance to a point, under its own metric.
+fn nearest_to(factors: &[Factor], at: DVec2) -> usize {
+    let length = |factor: &Factor| factor.travelled + factor.value(at - factor.at);
+    let lengths = factors.iter().map(length).enumerate();
+    lengths.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
 }
 
 /// Where a factor reaches.

@@ -3,7 +3,7 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use super::first_order::FirstOrder;
-use super::functional::{ConeAt, Foot};
+use super::functional::{FactorAt, Foot};
 use super::halo::{MARGIN, Strip, WIDE, fill, rings_of, seen};
 use super::triangle::LaneTriangle;
 use crate::eikonal::stencil::UNREACHED;
@@ -327,7 +327,7 @@ fn find_line<const IS_FACTORED: bool>(
             here: triangle.mirror(here),
             at_a: triangle.mirror(axis),
             at_b: triangle.mirror([diagonal(xx), diagonal(xy), diagonal(yy)]),
-            cone: ConeAt::new(
+            factor: FactorAt::new(
                 on[i],
                 triangle.mirror(m0),
                 triangle.mirror_place([origin[0] + i as f32, origin[1]]),

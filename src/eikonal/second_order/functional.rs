@@ -29,9 +29,9 @@ impl Quadratic {
     }
 }
 
-/// The cone seen from a node at `v` from its point, times `on`.
+/// The factor seen from a node at `v` from its point, times `on`.
 #[derive(Clone, Copy)]
-pub(super) struct ConeAt {
+pub(super) struct FactorAt {
     on: f32,
     m0: Quadratic,
     v: [f32; 2],
@@ -40,7 +40,7 @@ pub(super) struct ConeAt {
     g: f32,
 }
 
-impl ConeAt {
+impl FactorAt {
     #[inline(always)]
     pub(super) fn new(on: f32, m0: Quadratic, v: [f32; 2]) -> Self {
         let mv = [m0.0 * v[0] + m0.1 * v[1], m0.1 * v[0] + m0.2 * v[1]];
@@ -55,7 +55,7 @@ impl ConeAt {
         self.on * more / (self.g + greatest(self.g2 + more, 0.0).sqrt())
     }
 
-    /// The square of the distance from the cone's point to `x + (1, θ)`.
+    /// The square of the distance from the factor's point to `x + (1, θ)`.
     #[inline(always)]
     fn far(&self) -> Quadratic {
         let Quadratic(xx, xy, yy) = self.m0;
@@ -76,7 +76,7 @@ pub(super) struct Foot {
     pub(super) here: Quadratic,
     pub(super) at_a: Quadratic,
     pub(super) at_b: Quadratic,
-    pub(super) cone: ConeAt,
+    pub(super) factor: FactorAt,
     /// `θ` of the round before; negative if it was in another triangle.
     pub(super) known: f32,
 }
@@ -85,13 +85,13 @@ impl Foot {
     /// `θ` after a step of Newton's method, and the defect `ρ` there.
     #[inline(always)]
     pub(super) fn minimise<const IS_FACTORED: bool>(self) -> (f32, f32) {
-        let Self { rise: [ra, rb, rc, rd], slope, here, cone, known, .. } = self;
+        let Self { rise: [ra, rb, rc, rd], slope, here, factor, known, .. } = self;
         let (mut wa, mut wb, mut wc, mut wd) = (ra, rb, rc, rd);
         if IS_FACTORED {
-            wa -= cone.rise(0.0);
-            wb -= cone.rise(1.0);
-            wc -= cone.rise(-1.0);
-            wd -= cone.rise(2.0);
+            wa -= factor.rise(0.0);
+            wb -= factor.rise(1.0);
+            wc -= factor.rise(-1.0);
+            wd -= factor.rise(2.0);
         }
         let (has_a, has_b) = (ra < 1e17, rb < 1e17);
         let free = has_a & has_b;
@@ -102,7 +102,7 @@ impl Foot {
         let base = choose(has_a, wa, wb);
         let rise = choose(free, wb - wa, 0.0);
         let (ca, cb) = (open(self.at_a, here), open(self.at_b, here));
-        let far = cone.far();
+        let far = factor.far();
 
         // The first-order foot, see `segment`.
         let d = choose(free, slope, 0.0);
@@ -117,7 +117,7 @@ impl Foot {
         let (mut pc, mut hc) = (0.0, 0.0);
         if IS_FACTORED {
             let [_, first, second] = far.jet(t);
-            (pc, hc) = (cone.on * first, cone.on * second);
+            (pc, hc) = (factor.on * first, factor.on * second);
         }
         let first = pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
             + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
@@ -128,7 +128,7 @@ impl Foot {
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
         let mut defect = base + t * rise + length - bend;
         if IS_FACTORED {
-            defect += cone.rise(t);
+            defect += factor.rise(t);
         }
         (t, defect)
     }

@@ -30,10 +30,11 @@ impl LaneTriangle {
 
     /// The bits of a triangle.
     #[inline(always)]
-    const fn to_bits(t: Triangle) -> u32 {
-        t.negative as u32 * Self::NEGATIVE
-            | t.along_y as u32 * Self::ALONG_Y
-            | t.falling as u32 * Self::FALLING
+    fn to_bits(t: Triangle) -> u32 {
+        let bit = |yes: bool, bit: u32| if yes { bit } else { 0 };
+        bit(t.negative, Self::NEGATIVE)
+            | bit(t.along_y, Self::ALONG_Y)
+            | bit(t.falling, Self::FALLING)
     }
 
     #[inline(always)]
