@@ -359,3 +359,63 @@ impl Update for Forget {
         (choose(is_lost, UNREACHED, old), is_lost)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eikonal::field::{AREA, TensorTile};
+    use crate::eikonal::stencil::foot::best_foot;
+    use crate::linalg::Sym2;
+
+    /// Ratios up to 25 in turning directions, and a closed node here and there.
+    fn tensor(place: usize) -> Option<Sym2> {
+        let (sin, cos) = (0.03 * place as f64).sin_cos();
+        let ratio = 1.0 + (place % 25) as f64;
+        let along = Sym2::new(cos * cos, sin * cos, sin * sin) * ratio;
+        (place % 29 != 3).then(|| along + Sym2::new(sin * sin, -sin * cos, cos * cos))
+    }
+
+    /// All values of a tile with one start node, cut off from any other.
+    fn solve_alone(tensors: &TensorTile, seeds: &[f32; AREA]) -> Block {
+        let tile = Tile { tensors, factor: None, tolerance: 0.0, seeds: Some(seeds) };
+        let mut workspace = Workspace::default();
+        *workspace.values() = [[f32::INFINITY; BLOCK]; BLOCK];
+        for place in 0..AREA {
+            let open = tensors.det[place] > 0.0;
+            let value = if open { seeds[place].min(UNREACHED) } else { f32::INFINITY };
+            workspace.values()[place / SIDE + 1][place % SIDE + 1] = value;
+        }
+        let problem = Problem {
+            tile,
+            rule: Rule::Lower,
+            size: [SIDE; 2],
+            changed: 1 << 8,
+            first: 8,
+            slacks: [0.0; 8],
+            is_ring: [false; 2],
+        };
+        while solve(&mut workspace, &problem).unconverged < f32::INFINITY {}
+        *workspace.values()
+    }
+
+    #[test]
+    fn a_converged_tile_has_the_values_of_the_plain_update() {
+        let mut tensors = TensorTile { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
+        for place in 0..AREA {
+            let Some(d) = tensor(place) else { continue };
+            (tensors.xx[place], tensors.xy[place]) = (d.xx as f32, d.xy as f32);
+            tensors.det[place] = d.det() as f32;
+        }
+        let mut seeds = [f32::INFINITY; AREA];
+        seeds[100] = 0.0;
+        let values = solve_alone(&tensors, &seeds);
+        for place in (0..AREA).filter(|&place| place != 100) {
+            let Some(d) = tensor(place) else { continue };
+            let (row, col) = (place / SIDE + 1, place % SIDE + 1);
+            let ring = rings([&values[row - 1], &values[row], &values[row + 1]], 1);
+            let (best, _) = best_foot(ring_of(&ring, col - 1), [0.0; 8], d.inverse()).unwrap();
+            let value = f64::from(values[row][col]);
+            assert!((value - best).abs() <= 1e-5 * best, "{place}: {value}, {best}");
+        }
+    }
+}
