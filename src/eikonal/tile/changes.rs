@@ -15,7 +15,6 @@ pub(crate) const ROUNDING: f32 = 2.4e-7;
 
 /// The rows and the columns of a tile of a size next to neighbours in a set, one bit each in the order of [`RING`]; a corner is in
 /// the row. Bit 8 is the tile itself: all rows.
-#[inline(always)]
 pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [LineMask; 2] {
     let line = |at: i32, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
     let itself = if sides & 1 << RING.len() != 0 { ALL } else { 0 };
@@ -29,7 +28,6 @@ pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [LineMask; 2
 /// For each neighbour, in the order of [`RING`], the least value among the changes in a tile of a size that could improve it, or
 /// supported it; infinite if none. `slacks` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
 /// `g(y) < g(x) + slack`.
-#[inline(always)]
 pub(super) fn for_neighbours(
     before: &Block,
     after: &Block,
@@ -66,7 +64,6 @@ pub(super) fn for_neighbours(
 }
 
 /// The least of the changes in the first `count` nodes of a line that could improve the line `beside` it.
-#[inline(always)]
 fn least_change(
     count: usize,
     old: [f32; SIDE],

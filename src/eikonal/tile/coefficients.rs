@@ -191,7 +191,7 @@ pub(crate) fn line_tensors(tile: &Tile<'_>, line: usize, by_columns: bool) -> Li
     [xx, xy, det]
 }
 
-/// The factoring terms at the nodes of one line of a tile.
+/// The factoring terms at the nodes of one line of a tile: 0 without a factor.
 #[inline(always)]
 pub(crate) fn factoring_terms(
     tile: &Tile<'_>,
@@ -201,7 +201,10 @@ pub(crate) fn factoring_terms(
     terms: &mut [Lanes; 8],
     limits: &mut LaneLimits,
 ) {
-    let Some((factor, first)) = tile.factor else { return };
+    let Some((factor, first)) = tile.factor else {
+        *terms = [[0.0; SIDE]; 8];
+        return;
+    };
     let (factor, first) =
         if by_columns { (factor.transposed(), first.yx()) } else { (*factor, first) };
     let from = (first - factor.at) + DVec2::new(0.0, line as f64);

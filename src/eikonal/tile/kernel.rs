@@ -103,7 +103,7 @@ impl Default for Workspace {
 #[derive(Debug)]
 struct Prepared {
     lines: [Coefficients; SIDE],
-    /// What to add to each neighbour in the order of [`RING`], if the tile has a factor.
+    /// What to add to each neighbour in the order of [`RING`]; only made by kernels that are `IS_FACTORED`.
     terms: [[Lanes; 8]; SIDE],
     ready: LineMask,
 }
@@ -116,7 +116,7 @@ impl Default for Prepared {
 
 /// Sweeps a tile until it converges. The values in the workspace are those of the tile and its halo, before and afterwards.
 pub(crate) fn solve(workspace: &mut Workspace, problem: &Problem<'_>) -> Solved {
-    // One kernel for each case: one that chooses inside was 2 to 4 % slower.
+    // A kernel for each: one that chooses inside was 2 to 4 % slower. What forgets is seldom run.
     match (problem.rule, problem.tile.factor.is_some()) {
         (Rule::Lower, false) => {
             simd::dispatch(Solve::<_, false> { workspace, problem, update: Lower })
@@ -124,10 +124,7 @@ pub(crate) fn solve(workspace: &mut Workspace, problem: &Problem<'_>) -> Solved 
         (Rule::Lower, true) => {
             simd::dispatch(Solve::<_, true> { workspace, problem, update: Lower })
         }
-        (Rule::Forget, false) => {
-            simd::dispatch(Solve::<_, false> { workspace, problem, update: Forget })
-        }
-        (Rule::Forget, true) => {
+        (Rule::Forget, _) => {
             simd::dispatch(Solve::<_, true> { workspace, problem, update: Forget })
         }
     }
@@ -197,7 +194,6 @@ impl<U: Update, const IS_FACTORED: bool> Kernel for Solve<'_, U, IS_FACTORED> {
 }
 
 /// The slacks of the neighbours; where the tile itself is one, not less than was found of it now.
-#[inline(always)]
 fn with_own(mut slacks: [f32; 8], is_ring: [bool; 2], own: f32) -> [f32; 8] {
     for k in 0..8 {
         let (dx, dy) = RING[k];
@@ -209,7 +205,6 @@ fn with_own(mut slacks: [f32; 8], is_ring: [bool; 2], own: f32) -> [f32; 8] {
 }
 
 /// The least value of a tile.
-#[inline(always)]
 fn least_of(values: &Block) -> f32 {
     let nodes = values[1..=SIDE].iter().flat_map(|line| &line[1..=SIDE]);
     nodes.fold(f32::INFINITY, |least, &value| least.min(value))
@@ -262,7 +257,7 @@ impl Workspace {
                 continue;
             }
             dirty &= !(1 << row);
-            prepared.prepare(tile, row, by_columns, limits);
+            prepared.prepare::<IS_FACTORED>(tile, row, by_columns, limits);
             let Prepared { lines, terms, .. } = &*prepared;
             let terms = if IS_FACTORED { Some(&terms[row]) } else { None };
             if update_line(update, values, row, &lines[row], terms, &mut changed) {
@@ -280,14 +275,22 @@ impl Workspace {
 impl Prepared {
     /// Makes what a line needs.
     #[inline(always)]
-    fn prepare(&mut self, tile: &Tile<'_>, line: usize, by_columns: bool, limits: &mut LaneLimits) {
+    fn prepare<const IS_FACTORED: bool>(
+        &mut self,
+        tile: &Tile<'_>,
+        line: usize,
+        by_columns: bool,
+        limits: &mut LaneLimits,
+    ) {
         if self.ready & 1 << line != 0 {
             return;
         }
         self.ready |= 1 << line;
         let tensors = line_tensors(tile, line, by_columns);
         self.lines[line].prepare(tile, line, by_columns, &tensors, limits);
-        factoring_terms(tile, line, by_columns, &tensors, &mut self.terms[line], limits);
+        if IS_FACTORED {
+            factoring_terms(tile, line, by_columns, &tensors, &mut self.terms[line], limits);
+        }
     }
 }
 
