@@ -116,80 +116,83 @@ impl Default for Prepared {
 
 /// Sweeps a tile until it converges. The values in the workspace are those of the tile and its halo, before and afterwards.
 pub(crate) fn solve(workspace: &mut Workspace, problem: &Problem<'_>) -> Solved {
+    workspace.begin();
+    let Swept { sweeps, is_changed, is_converged } = sweep(workspace, problem);
+    workspace.transpose(false);
+    let Workspace { values, before, limits, .. } = &*workspace;
+    let limits = limits.of_all();
+    let nothing = [f32::INFINITY; 8];
+    let changes = if is_changed {
+        let slacks = with_own(problem.slacks, problem.is_ring, limits.slack);
+        for_neighbours(before, values, problem.size, slacks)
+    } else {
+        nothing
+    };
+    let unconverged = if is_converged { f32::INFINITY } else { least_of(values) };
+    Solved { is_changed, changes, unconverged, limits, sweeps }
+}
+
+/// What the sweeps over a tile came to.
+struct Swept {
+    sweeps: u32,
+    is_changed: bool,
+    is_converged: bool,
+}
+
+fn sweep(workspace: &mut Workspace, problem: &Problem<'_>) -> Swept {
     // A kernel for each: one that chooses inside was 2 to 4 % slower. What forgets is seldom run.
     match (problem.rule, problem.tile.factor.is_some()) {
         (Rule::Lower, false) => {
-            simd::dispatch(Solve::<_, false> { workspace, problem, update: Lower })
+            simd::dispatch(Sweeps::<_, false> { workspace, problem, update: Lower })
         }
         (Rule::Lower, true) => {
-            simd::dispatch(Solve::<_, true> { workspace, problem, update: Lower })
+            simd::dispatch(Sweeps::<_, true> { workspace, problem, update: Lower })
         }
         (Rule::Forget, _) => {
-            simd::dispatch(Solve::<_, true> { workspace, problem, update: Forget })
+            simd::dispatch(Sweeps::<_, true> { workspace, problem, update: Forget })
         }
     }
 }
 
-struct Solve<'a, U, const IS_FACTORED: bool> {
+struct Sweeps<'a, U, const IS_FACTORED: bool> {
     workspace: &'a mut Workspace,
     problem: &'a Problem<'a>,
     update: U,
 }
 
-impl<U: Update, const IS_FACTORED: bool> Kernel for Solve<'_, U, IS_FACTORED> {
-    type Output = Solved;
+impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
+    type Output = Swept;
 
     /// Away from the least change and back, then across and back.
     #[inline(always)]
-    fn run(self) -> Solved {
+    fn run(self) -> Swept {
         let Self { workspace, problem, update } = self;
-        let &Problem { ref tile, size, changed, first, slacks, is_ring, .. } = problem;
-        workspace.begin();
+        let &Problem { ref tile, size, changed, first, .. } = problem;
         let (dx, dy) = if usize::from(first) < 8 { RING[usize::from(first)] } else { (0, 0) };
         let mut descending = [dy > 0, dx > 0];
         let mut by_columns = dx != 0 && dy == 0;
         // Rows and columns owed to changes outside, and those owed to changes inside, which either pays off.
         let mut outside = lines_beside(changed, size);
         let mut inside = [0; 2];
-        let mut is_changed = false;
-        let mut sweeps = 0;
-        while sweeps < MAX_SWEEPS && (outside, inside) != ([0; 2], [0; 2]) {
+        let mut swept = Swept { sweeps: 0, is_changed: false, is_converged: false };
+        loop {
+            swept.is_converged = (outside, inside) == ([0; 2], [0; 2]);
+            if swept.is_converged || swept.sweeps == MAX_SWEEPS {
+                return swept;
+            }
             let side = usize::from(by_columns);
             let dirty = outside[side] | inside[side];
             if dirty != 0 {
-                inside = workspace.sweep::<IS_FACTORED>(
-                    &update,
-                    tile,
-                    by_columns,
-                    descending[side],
-                    dirty,
-                );
+                let descending = &mut descending[side];
+                inside =
+                    workspace.sweep::<IS_FACTORED>(&update, tile, by_columns, *descending, dirty);
                 outside[side] = 0;
-                sweeps += 1;
-                is_changed |= inside != [0; 2];
-                descending[side] = !descending[side];
+                swept.sweeps += 1;
+                swept.is_changed |= inside != [0; 2];
+                *descending = !*descending;
             }
-            by_columns ^= dirty == 0 || outside[1 - side] != 0 || sweeps.is_multiple_of(2);
+            by_columns ^= dirty == 0 || outside[1 - side] != 0 || swept.sweeps.is_multiple_of(2);
         }
-        let converged = (outside, inside) == ([0; 2], [0; 2]);
-        let limits = workspace.limits.of_all();
-        let mut solved = Solved {
-            is_changed,
-            changes: [f32::INFINITY; 8],
-            unconverged: f32::INFINITY,
-            limits,
-            sweeps,
-        };
-        if is_changed {
-            workspace.transpose(false);
-            let Workspace { values, before, .. } = &*workspace;
-            let slacks = with_own(slacks, is_ring, limits.slack);
-            solved.changes = for_neighbours(before, values, size, slacks);
-            if !converged {
-                solved.unconverged = least_of(values);
-            }
-        }
-        solved
     }
 }
 
