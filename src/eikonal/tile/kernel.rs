@@ -369,7 +369,8 @@ impl Update for Forget {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eikonal::field::{AREA, TensorTile};
+    use crate::eikonal::tensor_field::TensorTile;
+    use crate::grid::tiling::AREA;
     use crate::eikonal::stencil::foot::best_foot;
     use crate::linalg::Sym2;
 
