@@ -55,7 +55,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
     }
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
     // Of no tile it is known what could not improve it.
-    let unknown = Limits { slack: f32::MAX, longest_step: f32::MAX };
+    let unknown = Limits { margin: f32::MAX, longest_step: f32::MAX };
     let limits = vec![unknown; field.tiling.tiles()];
     Ok(DistanceMap {
         field,

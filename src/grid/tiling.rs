@@ -49,7 +49,7 @@ impl Tiling {
     }
 
     /// Whether a tile is its own neighbour along x and along y.
-    pub(crate) fn is_ring(&self) -> [bool; 2] {
+    pub(crate) fn is_own_neighbour(&self) -> [bool; 2] {
         let [across, down] = self.periodic;
         [across && self.across == 1, down && self.down == 1]
     }

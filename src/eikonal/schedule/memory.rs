@@ -76,18 +76,18 @@ impl TileStore for MemoryStore {
 struct SharedLimits([AtomicU32; 2]);
 
 impl SharedLimits {
-    fn new(Limits { slack, longest_step }: Limits) -> Self {
-        Self([slack, longest_step].map(|limit| AtomicU32::new(limit.to_bits())))
+    fn new(Limits { margin, longest_step }: Limits) -> Self {
+        Self([margin, longest_step].map(|limit| AtomicU32::new(limit.to_bits())))
     }
 
     fn get(&self) -> Limits {
-        let [slack, longest_step] =
+        let [margin, longest_step] =
             self.0.each_ref().map(|limit| f32::from_bits(limit.load(Relaxed)));
-        Limits { slack, longest_step }
+        Limits { margin, longest_step }
     }
 
-    fn set(&self, &Limits { slack, longest_step }: &Limits) {
-        for (bits, limit) in self.0.iter().zip([slack, longest_step]) {
+    fn set(&self, &Limits { margin, longest_step }: &Limits) {
+        for (bits, limit) in self.0.iter().zip([margin, longest_step]) {
             bits.store(limit.to_bits(), Relaxed);
         }
     }

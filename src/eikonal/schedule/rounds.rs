@@ -63,8 +63,8 @@ pub(crate) struct Schedule<S> {
     activations: Vec<u32>,
     /// How many nodes have a value from before.
     pub(super) reached: usize,
-    /// The greatest slack of any tile.
-    slack: f32,
+    /// The greatest margin of any tile.
+    margin: f32,
 }
 
 /// How a solve ended.
@@ -76,10 +76,10 @@ pub(crate) struct End {
 }
 
 impl<S: TileStore> Schedule<S> {
-    /// A solve in a store of so many tiles, none of which waits yet. `slack` is the greatest that is known of any.
-    pub(crate) fn new(store: S, tiles: usize, slack: f32) -> Self {
+    /// A solve in a store of so many tiles, none of which waits yet. `margin` is the greatest that is known of any.
+    pub(crate) fn new(store: S, tiles: usize, margin: f32) -> Self {
         let active = ActiveSet::new(tiles);
-        Self { store, active, activations: vec![0; tiles], reached: 0, slack }
+        Self { store, active, activations: vec![0; tiles], reached: 0, margin }
     }
 
     /// Activates a tile that holds start values, and the neighbours that some lie beside.
@@ -110,7 +110,7 @@ impl<S: TileStore> Schedule<S> {
     pub(crate) fn clear(&mut self, tiles: &[usize]) {
         self.active.clear(tiles);
         tiles.iter().for_each(|&tile| self.activations[tile] = 0);
-        (self.reached, self.slack) = (0, 0.0);
+        (self.reached, self.margin) = (0, 0.0);
     }
 
     /// Solves the tiles that wait and those that their changes activate, in rounds, until `stop` allows to end. Before
@@ -126,7 +126,7 @@ impl<S: TileStore> Schedule<S> {
         mut open: impl FnMut(&[u64], &S),
         control: &Control,
     ) -> Result<End> {
-        let Self { store, active, activations, reached, slack } = self;
+        let Self { store, active, activations, reached, margin } = self;
         let store = &*store;
         let mut leader = Leader {
             equation,
@@ -134,7 +134,7 @@ impl<S: TileStore> Schedule<S> {
             active,
             activations,
             reached: *reached,
-            slack,
+            margin,
             end: End { least_change: f32::INFINITY, statistics: Statistics::default() },
         };
         let failure = OnceLock::new();
@@ -181,7 +181,7 @@ struct Leader<'a, S> {
     active: &'a mut ActiveSet,
     activations: &'a mut [u32],
     reached: usize,
-    slack: &'a mut f32,
+    margin: &'a mut f32,
     end: End,
 }
 
@@ -198,7 +198,7 @@ impl<S: TileStore> Leader<'_, S> {
         statistics.activations += 1;
         statistics.tiles += usize::from(*activations == 1);
         statistics.sweeps += outcome.sweeps as usize;
-        *self.slack = self.slack.max(outcome.slack);
+        *self.margin = self.margin.max(outcome.margin);
         if outcome.unconverged < f32::INFINITY {
             self.active.activate(tile, outcome.unconverged, ITSELF);
         }
@@ -223,7 +223,7 @@ impl<S: TileStore> Leader<'_, S> {
             field,
             store: self.store,
             reached: self.reached + statistics.tiles * AREA,
-            slack: *self.slack,
+            margin: *self.margin,
             least_change: *least_change,
         };
         if self.active.is_empty() || progress.meets(stop)? {
@@ -250,25 +250,25 @@ struct Outcome {
     changes: [f32; 8],
     /// The least value of the tile if it has not converged yet; infinite if it has.
     unconverged: f32,
-    /// See [`Limits::slack`].
-    slack: f32,
+    /// See [`Limits::margin`].
+    margin: f32,
     sweeps: u32,
 }
 
 impl Outcome {
     const NOTHING: Self =
-        Self { changes: [f32::INFINITY; 8], unconverged: f32::INFINITY, slack: 0.0, sweeps: 0 };
+        Self { changes: [f32::INFINITY; 8], unconverged: f32::INFINITY, margin: 0.0, sweeps: 0 };
 
     fn to_bits(self) -> [u32; 11] {
         let [e, se, s, sw, w, nw, n, ne] = self.changes.map(f32::to_bits);
-        [e, se, s, sw, w, nw, n, ne, self.unconverged.to_bits(), self.slack.to_bits(), self.sweeps]
+        [e, se, s, sw, w, nw, n, ne, self.unconverged.to_bits(), self.margin.to_bits(), self.sweeps]
     }
 
-    fn from_bits([changes @ .., unconverged, slack, sweeps]: [u32; 11]) -> Self {
+    fn from_bits([changes @ .., unconverged, margin, sweeps]: [u32; 11]) -> Self {
         Self {
             changes: changes.map(f32::from_bits),
             unconverged: f32::from_bits(unconverged),
-            slack: f32::from_bits(slack),
+            margin: f32::from_bits(margin),
             sweeps,
         }
     }
@@ -285,9 +285,9 @@ fn solve_tile<S: TileStore>(
     let tile = tile as usize;
     let tiling = &equation.field.tiling;
     store.read(tile, workspace.values())?;
-    let mut slacks = [0.0; 8];
+    let mut margins = [0.0; 8];
     for (side, n) in tiling.neighbours(tile) {
-        slacks[side] = store.limits(n)?.slack;
+        margins[side] = store.limits(n)?.margin;
     }
     let problem = Problem {
         tile: equation.on(tile),
@@ -295,15 +295,15 @@ fn solve_tile<S: TileStore>(
         size: tiling.size(tile),
         changed,
         first,
-        slacks,
-        is_ring: tiling.is_ring(),
+        margins,
+        is_own_neighbour: tiling.is_own_neighbour(),
     };
     let solved = kernel::solve(workspace, &problem);
-    let Limits { slack, .. } = solved.limits;
+    let Limits { margin, .. } = solved.limits;
     store.raise_limits(tile, &solved.limits)?;
     if solved.is_changed {
         store.write(tile, workspace.values())?;
     }
     let kernel::Solved { changes, unconverged, sweeps, .. } = solved;
-    Ok(Outcome { changes, unconverged, slack, sweeps })
+    Ok(Outcome { changes, unconverged, margin, sweeps })
 }

@@ -48,8 +48,8 @@ pub(crate) fn solve(
     control: &Control,
 ) -> Result<Solution> {
     let tiling = &equation.field.tiling;
-    let slack = limits.iter().fold(0f32, |most, limits| most.max(limits.slack));
-    let mut schedule = Schedule::new(MemoryStore::new(values, limits), tiling.tiles(), slack);
+    let margin = limits.iter().fold(0f32, |most, limits| most.max(limits.margin));
+    let mut schedule = Schedule::new(MemoryStore::new(values, limits), tiling.tiles(), margin);
     match changes {
         Changes::All => schedule.activate_start(tiling, equation.seeds),
         Changes::Since { before, edited } => {

@@ -55,8 +55,8 @@ pub(crate) struct Progress<'a, S> {
     pub(crate) store: &'a S,
     /// At most so many nodes have a value.
     pub(crate) reached: usize,
-    /// The greatest slack of any tile.
-    pub(crate) slack: f32,
+    /// The greatest margin of any tile.
+    pub(crate) margin: f32,
     /// The least change that a tile has not seen: no value below that changes any more. Infinite when all is done.
     pub(crate) least_change: f32,
 }
@@ -74,12 +74,12 @@ impl<S: TileStore> Progress<'_, S> {
     }
 
     /// The greatest change that can bear on a value to be reported: a node not reached by then is farther, one reached
-    /// may still come down by its slack.
+    /// may still come down by its margin.
     pub(crate) fn last_change(&self, stop: &Stop) -> f32 {
         if !matches!(stop, Stop::Distance(_)) {
             return UNREACHED;
         }
-        stop.largest(self.field) + self.slack
+        stop.largest(self.field) + self.margin
     }
 
     fn meets_all(&self, goals: &[DVec2]) -> Result<bool> {
@@ -130,9 +130,9 @@ impl<S: TileStore> Progress<'_, S> {
 }
 
 /// Whether no change of this value and above will change a node: a neighbour improves it only if its value is below the
-/// node's and the slack.
+/// node's and the margin.
 pub(crate) fn is_final(value: f32, limits: &Limits, least_change: f32) -> bool {
-    value < UNREACHED && value + limits.slack < least_change
+    value < UNREACHED && value + limits.margin < least_change
 }
 
 /// Forgets all values that are not final while there are changes, or are not to be reported.

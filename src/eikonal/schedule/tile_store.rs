@@ -27,7 +27,7 @@ pub(crate) trait TileStore: Sync {
     fn raise_limits(&self, tile: usize, found: &Limits) -> Result<()> {
         let known = self.limits(tile)?;
         let limits = Limits {
-            slack: known.slack.max(found.slack),
+            margin: known.margin.max(found.margin),
             longest_step: known.longest_step.max(found.longest_step),
         };
         self.set_limits(tile, &limits)

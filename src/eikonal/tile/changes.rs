@@ -26,30 +26,30 @@ pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [LineMask; 2
 }
 
 /// For each neighbour, in the order of [`RING`], the least value among the changes in a tile of a size that could improve it, or
-/// supported it; infinite if none. `slacks` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
-/// `g(y) < g(x) + slack`.
+/// supported it; infinite if none. `margins` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
+/// `g(y) < g(x) + margin`.
 pub(super) fn for_neighbours(
     before: &Block,
     after: &Block,
     [cols, rows]: [usize; 2],
-    slacks: [f32; 8],
+    margins: [f32; 8],
 ) -> [f32; 8] {
     let across = |side: usize, row: usize| {
         let beside = row.wrapping_add_signed(RING[side].1 as isize);
         let [old, new, beside] =
             [&before[row], &after[row], &after[beside]].map(|line| lanes(line, 1));
-        least_change(cols, old, new, beside, slacks[side])
+        least_change(cols, old, new, beside, margins[side])
     };
     let down = |side: usize, col: usize| {
         let line = |block: &Block, col: usize| from_fn(|row| block[row + 1][col]);
         let beside = line(after, col.wrapping_add_signed(RING[side].0 as isize));
-        least_change(rows, line(before, col), line(after, col), beside, slacks[side])
+        least_change(rows, line(before, col), line(after, col), beside, margins[side])
     };
     let corner = |side: usize, col: usize, row: usize| {
         let (dx, dy) = RING[side];
         let beside =
             after[row.wrapping_add_signed(dy as isize)][col.wrapping_add_signed(dx as isize)];
-        improving(change(before[row][col], after[row][col]), beside, slacks[side])
+        improving(change(before[row][col], after[row][col]), beside, margins[side])
     };
     [
         down(0, cols),
@@ -69,7 +69,7 @@ fn least_change(
     old: [f32; SIDE],
     new: [f32; SIDE],
     beside: [f32; SIDE],
-    slack: f32,
+    margin: f32,
 ) -> f32 {
     // With one place before and after.
     let mut padded = [f32::INFINITY; SIDE + 2];
@@ -79,7 +79,7 @@ fn least_change(
     let mut found = [f32::INFINITY; SIDE];
     for i in 0..SIDE {
         let change = least(least(padded[i], padded[i + 1]), padded[i + 2]);
-        found[i] = choose(i < count, improving(change, beside[i], slack), f32::INFINITY);
+        found[i] = choose(i < count, improving(change, beside[i], margin), f32::INFINITY);
     }
     found.into_iter().fold(f32::INFINITY, least)
 }
@@ -92,6 +92,6 @@ fn change(old: f32, new: f32) -> f32 {
 
 /// The change, if it could improve a value.
 #[inline(always)]
-fn improving(change: f32, value: f32, slack: f32) -> f32 {
-    choose((value <= UNREACHED) & (change < value + slack), change, f32::INFINITY)
+fn improving(change: f32, value: f32, margin: f32) -> f32 {
+    choose((value <= UNREACHED) & (change < value + margin), change, f32::INFINITY)
 }

@@ -94,7 +94,7 @@ impl Coefficients {
                 along.hi[i] = choose(open, xy * length_of_a * inv_q, 0.0);
                 along.lo_rising[i] = choose(open, (xy - s) * inv_rising, 0.0);
                 along.lo_falling[i] = choose(open, -(s + xy) * inv_falling, 0.0);
-                // By how much the least over a segment may lie below an end: see `Limits::slack`.
+                // By how much the least over a segment may lie below an end: see `Limits::margin`.
                 obtuse[i] = greatest(obtuse[i], along.hi[i].abs() - length_of_a);
                 obtuse[i] = greatest(obtuse[i], -along.lo_rising[i] - rising);
                 obtuse[i] = greatest(obtuse[i], -along.lo_falling[i] - falling);
@@ -108,7 +108,7 @@ impl Coefficients {
         }
         // In a loop of its own, or the limits are scattered lane by lane.
         for i in 0..SIDE {
-            limits.slack[i] = greatest(limits.slack[i], obtuse[i]);
+            limits.margin[i] = greatest(limits.margin[i], obtuse[i]);
             limits.longest_step[i] = greatest(limits.longest_step[i], longest[i]);
         }
         let Some(seeds) = tile.seeds else { return };
@@ -157,7 +157,7 @@ impl Coefficients {
 /// [`Limits`] of the nodes in each lane; their greatest at once would be a chain of comparisons, one after the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LaneLimits {
-    slack: Lanes,
+    margin: Lanes,
     /// By how much factoring lowers a neighbour's value at most.
     term: Lanes,
     longest_step: Lanes,
@@ -167,7 +167,10 @@ impl LaneLimits {
     /// Those of all nodes.
     pub(crate) fn of_all(&self) -> Limits {
         let all = |lanes: &Lanes| lanes.iter().copied().fold(0.0, greatest);
-        Limits { slack: all(&self.slack) + all(&self.term), longest_step: all(&self.longest_step) }
+        Limits {
+            margin: all(&self.margin) + all(&self.term),
+            longest_step: all(&self.longest_step),
+        }
     }
 }
 

@@ -44,10 +44,10 @@ pub(crate) struct Problem<'a> {
     pub(crate) changed: u16,
     /// The one of them with the least change.
     pub(crate) first: u8,
-    /// [`Limits::slack`] of each neighbour as far as it is known.
-    pub(crate) slacks: [f32; 8],
+    /// [`Limits::margin`] of each neighbour as far as it is known.
+    pub(crate) margins: [f32; 8],
     /// Whether the tile is its own neighbour along x and along y, as in a periodic direction one tile wide.
-    pub(crate) is_ring: [bool; 2],
+    pub(crate) is_own_neighbour: [bool; 2],
 }
 
 /// What a sweep does to a node.
@@ -123,8 +123,8 @@ pub(crate) fn solve(workspace: &mut Workspace, problem: &Problem<'_>) -> Solved 
     let limits = limits.of_all();
     let nothing = [f32::INFINITY; 8];
     let changes = if is_changed {
-        let slacks = with_own(problem.slacks, problem.is_ring, limits.slack);
-        for_neighbours(before, values, problem.size, slacks)
+        let margins = with_own(problem.margins, problem.is_own_neighbour, limits.margin);
+        for_neighbours(before, values, problem.size, margins)
     } else {
         nothing
     };
@@ -196,15 +196,15 @@ impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
     }
 }
 
-/// The slacks of the neighbours; where the tile itself is one, not less than was found of it now.
-fn with_own(mut slacks: [f32; 8], is_ring: [bool; 2], own: f32) -> [f32; 8] {
+/// The margins of the neighbours; where the tile itself is one, not less than was found of it now.
+fn with_own(mut margins: [f32; 8], is_own_neighbour: [bool; 2], own: f32) -> [f32; 8] {
     for k in 0..8 {
         let (dx, dy) = RING[k];
-        if (dx == 0 || is_ring[0]) && (dy == 0 || is_ring[1]) {
-            slacks[k] = greatest(slacks[k], own);
+        if (dx == 0 || is_own_neighbour[0]) && (dy == 0 || is_own_neighbour[1]) {
+            margins[k] = greatest(margins[k], own);
         }
     }
-    slacks
+    margins
 }
 
 /// The least value of a tile.
@@ -356,10 +356,10 @@ struct Forget;
 impl Update for Forget {
     #[inline(always)]
     fn update(&self, old: f32, best: f32, k: &Coefficients, i: usize) -> (f32, bool) {
-        let margin = ROUNDING * old;
-        // A margin that is not far below the shortest step lets nodes support each other.
-        let is_small = margin * margin < 0.25 * k.least_square_of_steps(i);
-        let is_supported = (best <= old + margin) & is_small;
+        let rounding = ROUNDING * old;
+        // Where it is not far below the shortest step, nodes could support each other.
+        let is_small = rounding * rounding < 0.25 * k.least_square_of_steps(i);
+        let is_supported = (best <= old + rounding) & is_small;
         // Values of the start hold by themselves.
         let is_lost = !is_supported & (old < least(k.ceiling[i], UNREACHED));
         (choose(is_lost, UNREACHED, old), is_lost)
@@ -369,9 +369,9 @@ impl Update for Forget {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eikonal::stencil::foot::best_foot;
     use crate::eikonal::tensor_field::TensorTile;
     use crate::grid::tiling::AREA;
-    use crate::eikonal::stencil::foot::best_foot;
     use crate::linalg::Sym2;
 
     /// Ratios up to 25 in turning directions, and a closed node here and there.
@@ -398,8 +398,8 @@ mod tests {
             size: [SIDE; 2],
             changed: 1 << 8,
             first: 8,
-            slacks: [0.0; 8],
-            is_ring: [false; 2],
+            margins: [0.0; 8],
+            is_own_neighbour: [false; 2],
         };
         while solve(&mut workspace, &problem).unconverged < f32::INFINITY {}
         *workspace.values()

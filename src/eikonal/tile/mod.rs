@@ -42,10 +42,10 @@ pub(crate) struct Tile<'a> {
 /// What is known of the updated nodes of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Limits {
-    /// By how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
+    /// The causality margin: by how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
     /// is above both ends unless the directions to them make an obtuse angle under `M`; then it may lie below
     /// one end `a` by up to `−aᵀMb/‖b‖`. Source factoring lowers the neighbours' values besides.
-    pub(crate) slack: f32,
+    pub(crate) margin: f32,
     /// The longest step of any node.
     pub(crate) longest_step: f32,
 }
