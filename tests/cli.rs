@@ -338,7 +338,7 @@ fn compare_fills_a_folder_and_repeats_itself() {
     assert_eq!(folder.json("cmp/routes.geojson")["features"].as_array().unwrap().len(), 3);
     assert!(folder.read("cmp/profile.csv").contains("\nisotropic,"));
     folder.write("cmp/mine.txt", "keep");
-    folder.bad(line, 2, "cmp/routes.geojson exists; give --overwrite to replace it");
+    folder.bad(line, 2, "cmp/routes.geojson: exists; give --overwrite to replace it");
     let again = folder.good(&format!("{line} --overwrite --threads 1"));
     assert_eq!(table, again);
     assert_eq!(folder.read("cmp/mine.txt"), "keep");
@@ -439,7 +439,7 @@ fn bad_outputs_are_refused_before_the_work() {
     let folder = Folder::new();
     let route = "route range.tif --start pixel:3,3 --goal pixel:50,30";
     folder.write("r.gpx", "precious");
-    folder.bad(&format!("{route} -o r.gpx"), 2, "r.gpx exists; give --overwrite to replace it");
+    folder.bad(&format!("{route} -o r.gpx"), 2, "r.gpx: exists; give --overwrite to replace it");
     assert_eq!(folder.read("r.gpx"), "precious");
     folder.bad(
         &format!("{route} -o r.kml"),
@@ -449,7 +449,7 @@ fn bad_outputs_are_refused_before_the_work() {
     folder.bad(
         &format!("{route} -o no/r.csv"),
         2,
-        "cannot write no/r.csv: the folder no does not exist; create it first",
+        "the folder no is missing; it must be there before no/r.csv is written; create it first",
     );
     folder.bad(&format!("{route} -o a.csv -o a.csv"), 2, "a.csv: named twice as an output");
     folder.bad(
@@ -460,7 +460,7 @@ fn bad_outputs_are_refused_before_the_work() {
     folder.bad(
         "compare range.tif --start pixel:3,3 --goal pixel:50,30 -o r.gpx",
         2,
-        "r.gpx: is a file; name a folder",
+        "r.gpx is a file; it must be a folder",
     );
 }
 
@@ -694,12 +694,12 @@ fn segment_refuses_what_makes_no_sense() {
     folder.bad(
         "segment range.tif --epsilon 5,20",
         2,
-        "the values of epsilon must fall from level to level",
+        "the list of values of epsilon is [5.0, 20.0]; it must be one that falls from level to level",
     );
     folder.bad(
         "segment range.tif --epsilon 20,5 --levels 1",
         2,
-        "the number of levels is 1, that of values of epsilon 2; there must be a level for each, and at least one",
+        "the number of levels is 1; it must be 1 or more, and that of the values of epsilon, 2",
     );
     folder.bad(
         "segment range.tif --epsilon 0",

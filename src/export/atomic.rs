@@ -14,27 +14,26 @@ type Output = BufWriter<NamedTempFile>;
 /// Whether `path` may be written: call it before long work.
 ///
 /// # Errors
-/// [`Error::Usage`] if the parent folder is missing, if something other than a file is in the way,
-/// or if the file exists and `overwrite` is false.
+/// [`Error::Argument`] if the parent folder is missing or something other than a file is in the way; [`Error::Io`] of kind
+/// [`AlreadyExists`](io::ErrorKind::AlreadyExists) if the file exists and `overwrite` is false.
 pub fn check_free(path: impl AsRef<Path>, overwrite: bool) -> Result<()> {
     let path = path.as_ref();
     let parent = parent(path);
     if !parent.is_dir() {
-        return Err(Error::usage(format!(
-            "cannot write {}: the folder {} does not exist; create it first",
-            path.display(),
-            parent.display()
-        )));
+        return Err(Error::argument(
+            format!("the folder {}", parent.display()),
+            "missing",
+            format!("there before {} is written", path.display()),
+        )
+        .advise("create it first"));
     }
     if !path.exists() {
         Ok(())
     } else if !path.is_file() {
-        Err(Error::usage(format!(
-            "cannot write {}: it exists and is not a regular file; give another name",
-            path.display()
-        )))
+        Err(Error::argument(path.display().to_string(), "no regular file", "one, or missing")
+            .advise("give another name"))
     } else if !overwrite {
-        Err(Error::usage(format!("{} exists; give --overwrite to replace it", path.display())))
+        Err(Error::io(path, io::ErrorKind::AlreadyExists.into()))
     } else {
         Ok(())
     }
@@ -44,13 +43,13 @@ pub fn check_free(path: impl AsRef<Path>, overwrite: bool) -> Result<()> {
 /// may not: call it before long work.
 ///
 /// # Errors
-/// As [`check_free`] for each file; [`Error::Usage`] if `folder` is a file.
+/// As [`check_free`] for each file; [`Error::Argument`] if `folder` is a file.
 pub fn check_folder_free(folder: impl AsRef<Path>, names: &[&str], overwrite: bool) -> Result<()> {
     let folder = folder.as_ref();
     if folder.is_dir() {
         names.iter().try_for_each(|name| check_free(folder.join(name), overwrite))
     } else if folder.exists() {
-        Err(Error::usage(format!("{}: is a file; name a folder", folder.display())))
+        Err(Error::argument(folder.display().to_string(), "a file", "a folder"))
     } else {
         check_free(folder, overwrite)
     }
@@ -88,8 +87,7 @@ pub fn write_file(
 /// us or on another disk), whose files are then moved up, and files of other names stay as they are.
 ///
 /// # Errors
-/// [`Error::Usage`] if the parent is missing, `path` is no folder, or a file to be placed exists and
-/// `overwrite` is false (nothing is changed then); those of `fill`; [`Error::Io`].
+/// Those of [`check_folder_free`]; also if a file to be placed exists and `overwrite` is false (nothing is changed then); those of `fill`; [`Error::Io`].
 pub fn write_folder(
     path: impl AsRef<Path>,
     overwrite: bool,
@@ -161,7 +159,7 @@ mod tests {
         let path = folder.path().join("a.txt");
         write_file(&path, false, |out| out.write_all(b"one")).unwrap();
         let error = write_file(&path, false, |out| out.write_all(b"two")).unwrap_err();
-        assert!(error.to_string().ends_with("a.txt exists; give --overwrite to replace it"));
+        assert!(error.to_string().ends_with("a.txt: exists"));
         assert_eq!(fs::read(&path).unwrap(), b"one");
         write_file(&path, true, |out| out.write_all(b"two")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
@@ -185,9 +183,9 @@ mod tests {
     fn a_missing_folder_and_a_folder_in_the_way_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let missing = write_file(folder.path().join("no/a.txt"), false, |_| Ok(())).unwrap_err();
-        assert!(missing.to_string().contains("does not exist"), "{missing}");
+        assert!(missing.to_string().contains("is missing; it must be there before"), "{missing}");
         let taken = write_file(folder.path(), true, |_| Ok(())).unwrap_err();
-        assert!(taken.to_string().contains("not a regular file"), "{taken}");
+        assert!(taken.to_string().contains("is no regular file"), "{taken}");
     }
 
     #[cfg(unix)]

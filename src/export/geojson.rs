@@ -18,7 +18,7 @@ use crate::terrain::Crs;
 /// Without a CRS the positions are map coordinates, and the member `coordinate_note` says so.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if only some of the points can be brought to longitude and latitude.
+/// [`Error::Argument`](crate::Error::Argument) if only some of the points can be brought to longitude and latitude.
 pub fn routes_geojson(
     routes: &[(impl AsRef<str>, &Route)],
     crs: &Crs,
@@ -296,7 +296,9 @@ pub(super) mod tests {
 
     #[test]
     fn without_a_crs_the_file_says_so() {
-        let json = written(&[("short", &route())], |_| Err(Error::usage("the DEM names no CRS")));
+        let json = written(&[("short", &route())], |_| {
+            Err(Error::argument("the CRS", "unknown", "known"))
+        });
         let note = json["coordinate_note"].as_str().unwrap();
         assert!(note.contains("map coordinates") && note.contains("names no CRS"), "{note}");
     }

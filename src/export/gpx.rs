@@ -11,7 +11,7 @@ use crate::terrain::Crs;
 /// A GPX document with one track per `(name, route)`, heights in metres.
 ///
 /// # Errors
-/// [`Error::Usage`] if `crs` has no way to longitude and latitude, which GPX needs.
+/// [`Error::Argument`] if `crs` has no way to longitude and latitude, which GPX needs.
 pub fn routes_gpx(routes: &[(impl AsRef<str>, &Route)], crs: &Crs) -> Result<String> {
     document(routes, |map| crs.to_lonlat(map))
 }
@@ -31,18 +31,17 @@ fn document(
         ..Gpx::default()
     };
     let mut out = Vec::new();
-    ::gpx::write(&gpx, &mut out).map_err(|e| Error::usage(format!("GPX: {e}")))?;
-    String::from_utf8(out).map_err(|e| Error::usage(format!("GPX: {e}")))
+    ::gpx::write(&gpx, &mut out).map_err(|e| Error::damaged("the GPX document", e))?;
+    String::from_utf8(out).map_err(|e| Error::damaged("the GPX document", e))
 }
 
 fn track(name: &str, route: &Route, to_lonlat: impl Fn(DVec2) -> Result<DVec2>) -> Result<Track> {
     let mut segment = TrackSegment::new();
     for p in &route.points {
         let place = to_lonlat(p.truncate()).map_err(|e| {
-            Error::usage(format!(
-                "GPX needs longitude and latitude, and these map coordinates have none ({e}); name \
-                 the DEM's CRS, or write .geojson or .csv, which can hold map coordinates"
-            ))
+            e.advise(
+                "name the CRS of the DEM, or write .geojson or .csv, which hold map coordinates",
+            )
         })?;
         let mut point = Waypoint::new((wrapped(place.x), round(place.y, 7)).into());
         point.elevation = p.z.is_finite().then(|| round(p.z, 2));
@@ -98,7 +97,9 @@ mod tests {
 
     #[test]
     fn without_a_crs_gpx_says_what_to_do() {
-        let error = document(&[("a", &route())], |_| Err(Error::usage("no CRS"))).unwrap_err();
+        let error =
+            document(&[("a", &route())], |_| Err(Error::argument("the CRS", "unknown", "known")))
+                .unwrap_err();
         assert!(error.to_string().contains("write .geojson"), "{error}");
     }
 

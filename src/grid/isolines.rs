@@ -27,19 +27,22 @@ const MAX_LEVELS: usize = 1000;
 /// The positive multiples of `step` up to the largest finite value.
 ///
 /// # Errors
-/// [`Error::Usage`] if `step` is not positive or gives more than a thousand levels.
+/// [`Error::Argument`] if `step` is not positive or gives more than a thousand levels.
 pub fn levels_by_step(values: &[f32], step: f64) -> Result<Vec<f64>> {
     if !(step.is_finite() && step > 0.0) {
-        return Err(Error::usage(format!("the isoline step is {step}; it must be positive")));
+        return Err(Error::argument("the isoline step", step, "positive"));
     }
     let top = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let count = (f64::from(top) / step).floor();
     if count > MAX_LEVELS as f64 {
-        return Err(Error::usage(format!(
-            "an isoline step of {step} gives {count} isolines up to {top}; the most is {MAX_LEVELS}: \
-             give a step of at least {}",
-            round_step(f64::from(top), MAX_LEVELS)
-        )));
+        return Err(Error::argument(
+            "the isoline step",
+            step,
+            format!(
+                "at least {}, for at most {MAX_LEVELS} isolines up to {top}",
+                round_step(f64::from(top), MAX_LEVELS)
+            ),
+        ));
     }
     Ok((1..=count as usize).map(|k| k as f64 * step).collect())
 }
@@ -62,18 +65,17 @@ pub fn round_step(extent: f64, parts: usize) -> f64 {
 /// Isolines at the ascending `levels` of `values` (row-major, `NaN` or infinite where there is none).
 ///
 /// # Errors
-/// [`Error::Usage`] if the number of values is not that of the nodes, or levels do not ascend.
+/// [`Error::Argument`] if the number of values is not that of the nodes, or levels do not ascend.
 pub fn isolines(frame: &GridFrame, values: &[f32], levels: &[f64]) -> Result<Vec<Isoline>> {
     if values.len() != frame.nodes() {
-        return Err(Error::usage(format!(
-            "{} values for a grid of {} × {} nodes",
+        return Err(Error::argument(
+            "the number of values",
             values.len(),
-            frame.cols(),
-            frame.rows()
-        )));
+            format!("{}, that of the nodes", frame.nodes()),
+        ));
     }
     if !levels.is_sorted_by(|a, b| a < b) {
-        return Err(Error::usage("isoline levels must ascend"));
+        return Err(Error::argument("the list of isoline levels", "not ascending", "ascending"));
     }
     let field = Field { cols: frame.cols(), rows: frame.rows(), values };
     let segments = field.segments(levels);

@@ -40,7 +40,7 @@ impl MetricField<'_> {
 /// the grid are set aside, which takes at most 0.2 ms per million nodes.
 ///
 /// # Errors
-/// [`Error::Usage`] if the seed is not on the grid or `epsilon` is no number, 0 or more; [`Error::Cancelled`].
+/// [`Error::Argument`] if the seed is not on the grid or `epsilon` is no number, 0 or more; [`Error::Cancelled`].
 pub fn cluster(
     field: &TensorField,
     seed: [usize; 2],
@@ -49,7 +49,7 @@ pub fn cluster(
 ) -> Result<Vec<(usize, f32)>> {
     let [col, row] = seed;
     if col >= field.cols() || row >= field.rows() {
-        return Err(Error::usage(format!("the seed ({col}, {row}) is not on the grid")));
+        return Err(Error::argument("the seed", "not on the grid", "on it").at_node(col, row));
     }
     Ok(Balls::new(field).around(seed, epsilon, control)?.collect())
 }
@@ -119,10 +119,15 @@ fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
     } else {
         "most hold nothing but their seed".to_owned()
     };
-    Error::usage(format!(
-        "{MOST} clusters with an epsilon of {epsilon:?} hold only {:.1} % of the surface; choose a larger one; {advice}",
-        100.0 * share
-    ))
+    Error::argument(
+        "epsilon",
+        format!(
+            "{epsilon:?}, so small that {MOST} clusters hold only {:.1} % of the surface",
+            100.0 * share
+        ),
+        "larger",
+    )
+    .advise(advice)
 }
 
 /// Grid coordinates of a place in the row-major grid.

@@ -27,7 +27,7 @@ pub struct Match {
 /// Some 50 ns and 24 bytes for each pair.
 ///
 /// # Errors
-/// [`Error::Usage`] for more than 16 million pairs.
+/// [`Error::Argument`] for more than 16 million pairs.
 pub fn matches(first: &[Signature], second: &[Signature], sized: bool) -> Result<Vec<Match>> {
     let pairs = (0..first.len()).flat_map(|i| (0..second.len()).map(move |j| (i, j)));
     let offset = first.len();
@@ -55,11 +55,12 @@ fn greedy(
 ) -> Result<Vec<Match>> {
     const MOST: usize = 1 << 24;
     if first.len().saturating_mul(second.len()) > MOST {
-        return Err(Error::usage(format!(
-            "{} and {} regions are too many to compare; segment more coarsely",
-            first.len(),
-            second.len()
-        )));
+        return Err(Error::argument(
+            "the number of regions",
+            format!("{} and {}", first.len(), second.len()),
+            format!("so few that there are at most {MOST} pairs"),
+        )
+        .advise("segment more coarsely"));
     }
     let unlike = |i: usize, j: usize| {
         let (a, b) = (&first[i], &second[j]);

@@ -23,9 +23,7 @@ impl Segmentation {
         control: &Control,
     ) -> Result<()> {
         if !(0.0..=1.0).contains(&tolerance) {
-            return Err(Error::usage(format!(
-                "the tolerance for merging is {tolerance}; it must lie between 0 and 1"
-            )));
+            return Err(Error::argument("the tolerance for merging", tolerance, "between 0 and 1"));
         }
         let Some(level) = self.levels.last_mut() else { return Ok(()) };
         loop {

@@ -33,19 +33,21 @@ impl Default for SegmentOptions {
 impl SegmentOptions {
     fn check(&self) -> Result<()> {
         if self.levels == 0 || self.epsilons.len() > self.levels {
-            return Err(Error::usage(format!(
-                "the number of levels is {}, that of values of epsilon {}; there must be a level for each, and at least one",
+            return Err(Error::argument(
+                "the number of levels",
                 self.levels,
-                self.epsilons.len()
-            )));
+                format!("1 or more, and that of the values of epsilon, {}", self.epsilons.len()),
+            ));
         }
         if let Some(epsilon) = self.epsilons.iter().find(|e| !(e.is_finite() && **e > 0.0)) {
-            return Err(Error::usage(format!(
-                "epsilon is {epsilon}; it must be positive and finite"
-            )));
+            return Err(Error::argument("epsilon", epsilon, "positive and finite"));
         }
         if !self.epsilons.is_sorted_by(|a, b| a > b) {
-            return Err(Error::usage("the values of epsilon must fall from level to level"));
+            return Err(Error::argument(
+                "the list of values of epsilon",
+                format!("{:?}", self.epsilons),
+                "one that falls from level to level",
+            ));
         }
         Ok(())
     }
@@ -90,7 +92,7 @@ impl Segmentation {
     /// Some 0.5 µs of one core per node and level, with its ranks; 0.1 ms and 3 kB per region. `docs/regions.md` has measurements.
     ///
     /// # Errors
-    /// [`Error::Usage`] for options out of range, ranks that are not one per node, no open node, or an `ε` so small that the clusters
+    /// [`Error::Argument`] for options out of range, ranks that are not one per node, no open node, or an `ε` so small that the clusters
     /// are more than 65 536; [`Error::Cancelled`].
     pub fn of(
         field: &TensorField,
@@ -101,12 +103,16 @@ impl Segmentation {
         options.check()?;
         let (cols, rows) = (field.cols(), field.rows());
         if ranks.len() != cols * rows {
-            return Err(Error::usage(format!("{} ranks for {cols} × {rows} nodes", ranks.len())));
+            return Err(Error::argument(
+                "the number of ranks",
+                ranks.len(),
+                format!("{}, that of the nodes", cols * rows),
+            ));
         }
         let open: Vec<usize> =
             (0..ranks.len()).filter(|&i| field.is_open(i % cols, i / cols)).collect();
         if open.is_empty() {
-            return Err(Error::usage("there is no open ground to segment"));
+            return Err(Error::argument("the number of open nodes", 0, "1 or more"));
         }
         let mut parts = vec![open];
         let mut levels = Vec::with_capacity(options.levels);

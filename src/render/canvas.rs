@@ -50,7 +50,11 @@ pub(super) struct Canvas {
 impl Canvas {
     pub(super) fn new(width: u32, height: u32) -> Result<Self> {
         let mut pixels = Pixmap::new(width, height).ok_or_else(|| {
-            Error::usage(format!("a picture of {width} × {height} pixels is not possible"))
+            Error::argument(
+                "the size of a picture",
+                format!("{width} × {height} pixels"),
+                "1 × 1 or more, and one that fits in memory",
+            )
         })?;
         pixels.fill(Color::WHITE);
         Ok(Self { pixels })
@@ -159,7 +163,7 @@ fn polyline_path(points: &[Vec2], closed: bool) -> Option<Path> {
 /// The opaque picture as PNG, 8 bits per channel without alpha.
 ///
 /// # Errors
-/// [`Error::Usage`] if it cannot be encoded.
+/// [`Error::Argument`] if it cannot be encoded.
 pub fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
     let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
     let mut out = Vec::new();
@@ -173,6 +177,12 @@ pub fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
             writer.write_image_data(&rgb)?;
             writer.finish()
         })
-        .map_err(|e| Error::usage(format!("the picture cannot be encoded as PNG: {e}")))?;
+        .map_err(|e| {
+            Error::argument(
+                "the picture",
+                format!("not to be encoded ({e})"),
+                "one that PNG can hold",
+            )
+        })?;
     Ok(out)
 }

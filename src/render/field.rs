@@ -107,14 +107,14 @@ impl<'a> FieldPicture<'a> {
     /// Draws the picture.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there is not one value per node or the size is out of bounds; cancelled.
+    /// [`Error::Argument`] if there is not one value per node or the size is out of bounds; cancelled.
     pub fn render(&self) -> Result<Pixmap> {
         if self.values.len() != self.frame.nodes() {
-            return Err(Error::usage(format!(
-                "{} values for a grid of {} nodes",
+            return Err(Error::argument(
+                "the number of values",
                 self.values.len(),
-                self.frame.nodes()
-            )));
+                format!("{}, that of the nodes", self.frame.nodes()),
+            ));
         }
         let range = self.gradient.range(self.values);
         let mut legend = Vec::new();

@@ -60,11 +60,11 @@ impl MapLayout {
         legend: impl IntoIterator<Item = Item>,
     ) -> Result<Self> {
         if !SIDES.contains(&side) {
-            return Err(Error::usage(format!(
-                "a picture of {side} pixels is asked for; between {} and {} are possible",
-                SIDES.start(),
-                SIDES.end()
-            )));
+            return Err(Error::argument(
+                "the longer side of a picture",
+                format!("{side} pixels"),
+                format!("between {} and {}", SIDES.start(), SIDES.end()),
+            ));
         }
         // The map in its proportions on the ground, those of the middle row where they vary.
         let extent = frame.mid_spacing() * DVec2::new(frame.cols() as f64, frame.rows() as f64);

@@ -91,15 +91,15 @@ impl<'a> MapPicture<'a> {
     /// Draws the map.
     ///
     /// # Errors
-    /// [`Error::Usage`] if heights or barriers are not one per node, or the size is out of bounds; cancelled.
+    /// [`Error::Argument`] if heights or barriers are not one per node, or the size is out of bounds; cancelled.
     pub fn render(&self) -> Result<Pixmap> {
         let nodes = self.frame.nodes();
         if self.heights.len() != nodes || ![0, nodes].contains(&self.barriers.len()) {
-            return Err(Error::usage(format!(
-                "{} heights and {} barriers for a grid of {nodes} nodes",
-                self.heights.len(),
-                self.barriers.len()
-            )));
+            return Err(Error::argument(
+                "the number of heights and that of barriers",
+                format!("{} and {}", self.heights.len(), self.barriers.len()),
+                format!("{nodes}, that of the nodes; there may be no barriers"),
+            ));
         }
         let mut layout = MapLayout::new(self.frame, &self.title, self.max_side_px, self.legend())?;
         self.draw_ground(&mut layout)?;

@@ -56,10 +56,14 @@ impl LogPlot {
     /// Draws the plot.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a coordinate that is negative or not finite.
+    /// [`Error::Argument`] for a coordinate that is negative or not finite.
     pub fn render(&self) -> Result<Pixmap> {
         if self.marks.iter().any(|m| !m.at.is_finite() || m.at.min_element() < 0.0) {
-            return Err(Error::usage("a point of a plot has a coordinate that is not 0 or more"));
+            return Err(Error::argument(
+                "a coordinate of a point of a plot",
+                "negative or not finite",
+                "0 or more",
+            ));
         }
         let mut canvas = Canvas::new(SIDE, SIDE)?;
         let decades = [0, 1].map(|axis| decades(self.marks.iter().map(|mark| mark.at[axis])));

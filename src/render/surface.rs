@@ -67,25 +67,31 @@ impl<'a> SurfacePicture<'a> {
     /// Draws the picture.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there is not one colour, or region, per node, the size is out of bounds, the view has no direction, or there is
+    /// [`Error::Argument`] if there is not one colour, or region, per node, the size is out of bounds, the view has no direction, or there is
     /// nothing to see.
     pub fn render(&self) -> Result<Pixmap> {
         let (cols, rows) = (self.surface.cols(), self.surface.rows());
         if self.colours.len() != cols * rows {
-            return Err(Error::usage(format!(
-                "{} colours for {cols} × {rows} nodes",
-                self.colours.len()
-            )));
+            return Err(Error::argument(
+                "the number of colours",
+                self.colours.len(),
+                format!("{}, that of the nodes", cols * rows),
+            ));
         }
         if !SIDES.contains(&self.max_side_px) {
-            return Err(Error::usage(format!(
-                "a picture of {} pixels is asked for",
-                self.max_side_px
-            )));
+            return Err(Error::argument(
+                "the longer side of a picture",
+                format!("{} pixels", self.max_side_px),
+                format!("between {} and {}", SIDES.start(), SIDES.end()),
+            ));
         }
         if ![0, cols * rows].contains(&self.regions.len()) {
             let found = self.regions.len();
-            return Err(Error::usage(format!("{found} regions for {cols} × {rows} nodes")));
+            return Err(Error::argument(
+                "the number of regions",
+                found,
+                format!("{}, that of the nodes", cols * rows),
+            ));
         }
         let camera = Camera::new(self.view)?;
         let nodes: Vec<Option<Vertex>> =
@@ -151,7 +157,7 @@ impl std::fmt::Debug for SurfacePicture<'_> {
 /// Pictures side by side, from left to right, on white.
 ///
 /// # Errors
-/// [`Error::Usage`] if there is none or they are too large together.
+/// [`Error::Argument`] if there is none or they are too large together.
 pub fn beside(pictures: &[Pixmap]) -> Result<Pixmap> {
     let width = pictures.iter().map(Pixmap::width).sum();
     let height = pictures.iter().map(Pixmap::height).max().unwrap_or(0);
@@ -175,9 +181,8 @@ struct Camera {
 
 impl Camera {
     fn new(view: DVec3) -> Result<Self> {
-        let view = view
-            .try_normalize()
-            .ok_or_else(|| Error::usage(format!("the view {view} has no direction")))?;
+        let view =
+            view.try_normalize().ok_or_else(|| Error::argument("the view", view, "a direction"))?;
         // From straight above, y is up.
         let right = DVec3::Z.cross(view).try_normalize().unwrap_or(DVec3::X);
         Ok(Self { right, up: view.cross(right), view })
@@ -229,7 +234,11 @@ impl Film {
         let size = least.distance(most);
         let extent = (most - least).truncate();
         if !(size.is_finite() && extent.max_element() > 0.0) {
-            return Err(Error::usage("there is nothing of the surface to see"));
+            return Err(Error::argument(
+                "the part of the surface that can be seen",
+                "empty",
+                "not empty",
+            ));
         }
         let margin = MARGIN * extent.max_element();
         let extent = extent + 2.0 * margin;

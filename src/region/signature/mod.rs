@@ -80,7 +80,7 @@ impl Signature {
 /// Some 0.15 µs of one core per node, and 49 bytes; on NURBS 0.25 µs. `docs/matching.md` has measurements.
 ///
 /// # Errors
-/// [`Error::Usage`] if the labels do not fit the surface; [`Error::Cancelled`].
+/// [`Error::Argument`] if the labels do not fit the surface; [`Error::Cancelled`].
 pub fn signatures(
     surface: &dyn Surface,
     labels: &[Option<u32>],
@@ -90,11 +90,19 @@ pub fn signatures(
     let (cols, rows) = (surface.cols(), surface.rows());
     let nodes = cols * rows;
     if labels.len() != nodes {
-        return Err(Error::usage(format!("{} labels for {nodes} nodes", labels.len())));
+        return Err(Error::argument(
+            "the number of labels",
+            labels.len(),
+            format!("{nodes}, that of the nodes"),
+        ));
     }
     let regions = labels.iter().flatten().max().map_or(0, |&last| last as usize + 1);
     if regions > nodes {
-        return Err(Error::usage(format!("label {} is larger than there are nodes", regions - 1)));
+        return Err(Error::argument(
+            "the largest label",
+            regions - 1,
+            format!("below the number of nodes, {nodes}"),
+        ));
     }
     let cut = Cut { surface, cols, rows, periodic: surface.periodic(), labels, regions };
     let extents = cut.sums(control, |run, extents| simd::dispatch(Extents { run, extents }))?;
