@@ -183,3 +183,120 @@ pub(crate) fn length_along(line: &[DVec2], cost: impl Fn(DVec2, DVec2) -> f64) -
         })
         .sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::metric::{Curvature, Delta, Difference, Isotropic, Tensor};
+    use crate::surface::{FitOptions, HeightSurface, Measures};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::{Crs, Terrain};
+
+    /// Heights as a surface in space.
+    struct InSpace<'a>(&'a HeightSurface);
+
+    impl Surface for InSpace<'_> {
+        fn cols(&self) -> usize {
+            self.0.cols()
+        }
+
+        fn rows(&self) -> usize {
+            self.0.rows()
+        }
+
+        fn jet(&self, at: DVec2) -> Jet {
+            Jet::Space(self.0.space_jet(at))
+        }
+
+        fn is_void(&self, col: usize, row: usize) -> bool {
+            self.0.is_void(col, row)
+        }
+
+        fn measures(&self) -> Measures {
+            self.0.measures()
+        }
+    }
+
+    fn surfaces() -> impl Iterator<Item = HeightSurface> {
+        [SyntheticKind::Fractal, SyntheticKind::Sphere].into_iter().map(|kind| {
+            let synthetic = Synthetic::new(kind, 40, 30, 25.0).unwrap();
+            let terrain = synthetic.terrain(Crs::none(), DVec2::ZERO).unwrap();
+            let mut heights = terrain.heights().to_vec();
+            heights[410] = f64::NAN;
+            let terrain = Terrain::new(terrain.frame().clone(), heights, Crs::none()).unwrap();
+            HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default()).unwrap()
+        })
+    }
+
+    fn apart(a: Sym2, b: Sym2) -> f64 {
+        let e = a + b * -1.0;
+        (e.xx.abs() + e.xy.abs() + e.yy.abs()) / (a.xx + a.yy)
+    }
+
+    #[test]
+    fn heights_have_one_metric_on_the_map_and_in_space() {
+        let control = Control::default();
+        let plain = Modifiers::default();
+        let weighed = Modifiers {
+            climb_weight: 20.0,
+            max_slope_deg: Some(35.0),
+            barrier: Some((0..1200).map(|i| i % 97 == 0).collect()),
+            cost: Some((0..1200).map(|i| 1.0 + (i % 7) as f32).collect()),
+        };
+        let metrics: [&dyn Metric; 3] = [&Isotropic, &Curvature::default(), &Difference::default()];
+        for surface in surfaces() {
+            let space = InSpace(&surface);
+            for (metric, modifiers) in
+                metrics.into_iter().flat_map(|metric| [(metric, &plain), (metric, &weighed)])
+            {
+                let on_map = metric.on(&surface, modifiers, &control).unwrap();
+                let in_space = metric.on(&space, modifiers, &control).unwrap();
+                assert_eq!(on_map.unit(), in_space.unit());
+                assert_eq!(on_map.parameters().first(), in_space.parameters().first());
+                for at in [DVec2::new(3.0, 4.0), DVec2::new(20.3, 11.7), DVec2::new(39.0, 29.0)] {
+                    let e = apart(on_map.grid_metric(at), in_space.grid_metric(at));
+                    assert!(e < 1e-8, "{metric:?} {at} {e:e}");
+                    let by = DVec2::new(0.3, -0.2);
+                    let [a, b] = [&on_map, &in_space].map(|field| field.step_cost(at, by));
+                    assert!((a / b - 1.0).abs() < 1e-8, "{metric:?} {a} {b}");
+                }
+                let nodes = (0..1200).map(|i| (i % 40, i / 40));
+                for (col, row) in nodes {
+                    assert_eq!(on_map.is_open(col, row), in_space.is_open(col, row));
+                    let blocks = [&on_map, &in_space].map(|field| {
+                        let mut speeds = SpeedBlock::default();
+                        field.block_speeds(col / BLOCK * BLOCK, row / BLOCK * BLOCK, &mut speeds);
+                        let (i, j) = (col % BLOCK, row % BLOCK);
+                        speeds.is_open(j, i).then(|| speeds.get(j, i).0)
+                    });
+                    let [Some(a), Some(b)] = blocks else {
+                        assert_eq!(blocks, [None, None]);
+                        continue;
+                    };
+                    let b = b.stretched(surface.axes(row as f64));
+                    assert!(apart(a, b) < 1e-8, "{metric:?} {col} {row} {a:?} {b:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tensors_in_space_are_bilinear_and_checked() {
+        let tensors: Arc<[Sym2]> =
+            (0..1200).map(|i| Sym2::new(2.0 + f64::from(i).sin(), 0.5, 1.0)).collect();
+        let (none, control) = (Modifiers::default(), Control::default());
+        for surface in surfaces() {
+            let space = InSpace(&surface);
+            let metric = Tensor { tensors: tensors.clone() };
+            let d = metric.on(&space, &none, &control).unwrap().speed(DVec2::new(3.5, 4.0));
+            let mean = 0.5 * (tensors[163].xx + tensors[164].xx);
+            assert!((d.unwrap().xx - mean).abs() < 1e-12);
+            let short = Tensor { tensors: tensors[1..].into() };
+            assert!(short.on(&space, &none, &control).is_err());
+            let negative = Curvature { delta: Delta::Auto(-1.0) };
+            assert!(negative.on(&space, &none, &control).is_err());
+        }
+    }
+}

@@ -70,3 +70,47 @@ pub(super) fn measured(
     let extent = if nodes > 0.0 { width.hypot(height) / nodes } else { 0.0 };
     Measures { area, rms_curvature: mean.sqrt(), extent }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::control::Control;
+    use crate::surface::{FitOptions, HeightSurface, Jet};
+    use crate::synthetic::{Synthetic, SyntheticKind};
+    use crate::terrain::Crs;
+
+    /// Heights as a surface in space.
+    struct InSpace<'a>(&'a HeightSurface);
+
+    impl Surface for InSpace<'_> {
+        fn cols(&self) -> usize {
+            self.0.cols()
+        }
+
+        fn rows(&self) -> usize {
+            self.0.rows()
+        }
+
+        fn jet(&self, at: DVec2) -> Jet {
+            Jet::Space(self.0.space_jet(at))
+        }
+    }
+
+    #[test]
+    fn on_the_map_and_in_space_gentle_ground_measures_the_same() {
+        let cylinder = Synthetic::new(SyntheticKind::Cylinder, 61, 41, 10.0).unwrap();
+        let gentle = cylinder.terrain(Crs::none(), DVec2::ZERO).unwrap();
+        let heights = gentle.heights().iter().map(|z| 1e-3 * z).collect();
+        let terrain =
+            crate::terrain::Terrain::new(gentle.frame().clone(), heights, Crs::none()).unwrap();
+        let surface =
+            HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default()).unwrap();
+        let (map, space) = (surface.measures(), InSpace(&surface).measures());
+        assert!((map.area / space.area - 1.0).abs() < 1e-12, "{map:?} {space:?}");
+        assert!((map.area / (600.0 * 400.0) - 1.0).abs() < 1e-6, "{map:?}");
+        assert!((map.extent / space.extent - 1.0).abs() < 1e-5, "{map:?} {space:?}");
+        assert!((map.rms_curvature / space.rms_curvature - 1.0).abs() < 0.05, "{map:?} {space:?}");
+    }
+}
