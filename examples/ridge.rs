@@ -1,7 +1,7 @@
 //! Isotropic against curvature route over a ridge: figure 1 (c, d) of Seong, Jeong, Cohen (SMI 2008).
 //!
 //! A long ridge lies between start and goal. The geodesic goes straight over it; the curvature route, to which
-//! bending over the crest is dear, goes far along the ridge to where it is low, and crosses there.
+//! bending over the crest is costly, goes far along the ridge to where it is low, and crosses there.
 //!
 //! `cargo run --release --example ridge [FOLDER]` prints their numbers, and draws them into FOLDER or `target/figures`.
 

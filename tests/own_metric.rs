@@ -126,13 +126,13 @@ fn modifiers_compose_with_metrics_of_ones_own() {
             .map(|metric| metric.on(&surface, modifiers, &control).unwrap().step_cost(at, by))
     };
     let none = Modifiers::default();
-    let dear = Modifiers { cost: Some(vec![3.0; 200 * 61].into()), ..none.clone() };
+    let costly = Modifiers { cost: Some(vec![3.0; 200 * 61].into()), ..none.clone() };
     let steady = Modifiers { climb_weight: 8.0, ..none.clone() };
     // Rows run along the pipe, which stands upright: all that is climbed is the length.
     let down = DVec2::Y * 0.1;
     for ([plain, costly], climb) in cost(&none, down)
         .into_iter()
-        .zip(cost(&dear, down))
+        .zip(cost(&costly, down))
         .map(|(a, b)| [a, b])
         .zip(cost(&steady, down))
     {

@@ -396,7 +396,7 @@ mod tests {
             if metric.is_open(col, row) {
                 let by = frame.spacing(row as f64) * DVec2::new(1.0, -1.0) * field.root_scale();
                 let d =
-                    metric.speed(DVec2::new(col as f64, row as f64)).unwrap().stretched(by.recip());
+                    metric.speed(DVec2::new(col as f64, row as f64)).unwrap().rescale(by.recip());
                 let (tile, i) = field.tiling.place(col, row);
                 let tile = field.tensors(tile);
                 let [xx, xy, det] = [tile.xx[i], tile.xy[i], tile.det[i]].map(f64::from);

@@ -65,16 +65,16 @@ impl Sym2 {
         self.form(v).max(0.0).sqrt()
     }
 
-    /// `diag(s) A diag(s)`: the matrix of the same form in coordinates stretched by `s`.
+    /// `diag(s) A diag(s)`: the same form in coordinates rescaled by `s`.
     #[must_use]
-    pub fn stretched(self, s: DVec2) -> Self {
+    pub fn rescale(self, s: DVec2) -> Self {
         Self::new(self.xx * s.x * s.x, self.xy * s.x * s.y, self.yy * s.y * s.y)
     }
 
-    /// `P A P` for a symmetric `P`.
+    /// The congruence `P A P` for a symmetric `P`.
     #[must_use]
     #[inline(always)]
-    pub fn within(self, p: Self) -> Self {
+    pub fn congruence(self, p: Self) -> Self {
         let (a, b) = (self.apply(DVec2::new(p.xx, p.xy)), self.apply(DVec2::new(p.xy, p.yy)));
         let (a, b) = (p.apply(a), p.apply(b));
         Self::new(a.x, a.y, b.y)

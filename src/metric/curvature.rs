@@ -152,7 +152,7 @@ pub(crate) fn in_space(jet: &SurfaceJet, delta: f64) -> Sym2 {
     } else {
         (-1f64.copysign(h), delta + 2.0 * h.abs(), 2.0 * h.abs())
     };
-    let raised = b.within(inverse);
+    let raised = b.congruence(inverse);
     (raised * q + inverse * c) * (delta * delta + delta * sum + k.abs()).recip()
 }
 

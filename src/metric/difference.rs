@@ -182,7 +182,7 @@ fn tensors(
         let (jets, axes) = (surface.row_space_jets(row), surface.axes(row as f64));
         for ((change, jet), tensor) in changes.iter().zip(&jets).zip(tensors) {
             let inverse = (change.gamma + Sym2::new(delta, 0.0, delta)).inverse();
-            *tensor = Frame::of(jet.first_form()).to_grid(inverse).stretched(axes);
+            *tensor = Frame::of(jet.first_form()).to_grid(inverse).rescale(axes);
         }
     });
     control.check()?;

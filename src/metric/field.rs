@@ -120,7 +120,7 @@ impl<'a> MetricField<'a> {
     pub(crate) fn grid_metric(&self, at: DVec2) -> Sym2 {
         let Some(tensor) = self.norm.tensor() else { return Sym2::NAN };
         let speed = self.speed_of(tensor, at, &self.surface.jet(at));
-        speed.inverse().stretched(self.surface.axes(at.y))
+        speed.inverse().rescale(self.surface.axes(at.y))
     }
 
     /// # Errors
@@ -275,7 +275,7 @@ mod tests {
                         assert_eq!(blocks, [None, None]);
                         continue;
                     };
-                    let b = b.stretched(surface.axes(row as f64));
+                    let b = b.rescale(surface.axes(row as f64));
                     assert!(apart(a, b) < 1e-8, "{metric:?} {col} {row} {a:?} {b:?}");
                 }
             }

@@ -10,13 +10,13 @@
 //!
 //! Each term depends on two neighbours, so the Hessian is tridiagonal. Points cannot move along the line: that leaves
 //! its shape free, and they cannot gather where the sum is too small an estimate of the length (as they would with
-//! both coordinates free, skipping what is dear). A shift in proportion to the tension of the segments, `n_iᵀ M n_i / |d|`, makes
+//! both coordinates free, skipping what is costly). A shift in proportion to the tension of the segments, `n_iᵀ M n_i / |d|`, makes
 //! the Hessian positive definite and the steps decrease `L` (Levenberg, Marquardt; Nocedal and Wright, Numerical
 //! Optimization, ch. 10).
 //!
 //! A point that would meet a wall is held before it. What was not shortened by a finer quadrature stays as traced.
 //!
-//! Where the metric jumps, `L` has no derivatives to go by, and one corner of dear ground stops the whole line. Such a line is
+//! Where the metric jumps, `L` has no derivatives to go by, and one corner of costly ground stops the whole line. Such a line is
 //! searched for by dynamic programming (Amini, Weymouth, Jain, IEEE PAMI 12, 1990), which needs none.
 
 use glam::DVec2;
@@ -492,19 +492,19 @@ mod tests {
     }
 
     #[test]
-    fn lines_into_dear_ground_are_refracted() {
+    fn lines_into_costly_ground_are_refracted() {
         // Layers c(x): with the invariant p of Snell's law a line goes ∫ p/√(c² − p²) dx aside and costs ∫ c²/√(c² − p²) dx.
-        // Cheap ground of cost 1, a ramp of one cell, and dear ground.
-        let layers = |p: f64, cheap: f64, dear: f64, ratio: f64| {
+        // Cheap ground of cost 1, a ramp of one cell, and costly ground.
+        let layers = |p: f64, cheap: f64, costly: f64, ratio: f64| {
             let root = |c: f64| (c * c - p * p).sqrt();
             let log = |c: f64| (c + root(c)).ln();
             let cost = |c: f64| 0.5 * (c * root(c) + p * p * log(c));
             let ramp = (ratio - 1.0).recip();
             let aside =
-                p * (cheap / root(1.0) + ramp * (log(ratio) - log(1.0)) + dear / root(ratio));
+                p * (cheap / root(1.0) + ramp * (log(ratio) - log(1.0)) + costly / root(ratio));
             let cost = cheap / root(1.0)
                 + ramp * (cost(ratio) - cost(1.0))
-                + ratio * ratio * dear / root(ratio);
+                + ratio * ratio * costly / root(ratio);
             (aside, cost)
         };
         for ratio in [10.0, 50.0, 1000.0] {
@@ -525,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_go_around_a_dear_block() {
+    fn lines_go_around_a_costly_block() {
         // A string around the cheap nodes beside the block; the corners of the ramp save it a trifle.
         let (start, goal) = (DVec2::new(60.0, 20.0), DVec2::new(62.0, 100.0));
         for ratio in [50.0, 1000.0] {

@@ -259,7 +259,7 @@ mod tests {
         for (form, ground) in
             [(space.first_form(), height.first_form()), (space.second_form(), height.second_form())]
         {
-            let ground = ground.stretched(index);
+            let ground = ground.rescale(index);
             let difference = form + ground * -1.0;
             assert!(difference.xx.abs() + difference.xy.abs() + difference.yy.abs() < 1e-9);
         }
