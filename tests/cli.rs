@@ -306,7 +306,7 @@ fn a_tensor_raster_measures_as_its_tensor_says() {
     folder.bad(
         &format!("{line} far.asc"),
         2,
-        "the costs run from 1 to 9999; more than 1 to 1000 cannot be computed with (use NaN or nodata for barriers)",
+        "the range of the costs is 1 to 9999; it must be as wide as 1 to 1000 at most; mark barriers by NaN or nodata",
     );
 }
 
@@ -888,7 +888,8 @@ fn terrains_of_a_few_cells_are_cut_and_matched() {
         "void.asc",
         "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 10\nNODATA_value -9\n-9 -9\n",
     );
-    let said = "error: void.asc: all heights are void; there is no surface to fit\n";
+    let said =
+        "error: void.asc: the number of heights that are not void is 0; it must be 1 or more\n";
     assert!(folder.run("surface void.asc").err.ends_with(said));
     let empty = folder.run("match range.tif void.asc");
     assert!(empty.code == 2 && empty.err.ends_with(said), "{empty:?}");

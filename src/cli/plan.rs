@@ -172,7 +172,7 @@ impl<'a> Journey<'a> {
     /// # Errors
     /// Always: the best account there is.
     pub(crate) fn explain<T>(&self, error: Error, fields: &[MetricField<'_>]) -> Result<T> {
-        if let Error::NoWay(_) = error {
+        if let Error::NoPath { .. } | Error::NoWay(_) = error {
             for field in fields {
                 self.solve(field, &Stop::Never)?;
             }

@@ -70,7 +70,7 @@ impl Solver {
     /// of what is solved again, and some ns per node of the grid.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve); [`Error::Usage`](crate::Error::Usage) if a node is not on the grid.
+    /// As [`solve`](Self::solve); [`Error::Argument`](crate::Error::Argument) if a node is not on the grid.
     pub fn update_nodes(
         &self,
         map: DistanceMap,

@@ -67,9 +67,11 @@ pub(super) fn seed_all(
         });
     }
     if seeds == 0 {
-        return Err(Error::usage(
-            "no open ground at the start: it lies outside the grid, on a void or a barrier, or where the metric \
-             is too extreme to compute with, as around heights that no terrain has",
+        return Err(Error::argument(
+            "the start",
+            "outside the grid, on a void or a barrier, or where the metric is too extreme to compute with, as around \
+             heights that no terrain has",
+            "on open ground",
         ));
     }
     Ok(())
@@ -132,10 +134,7 @@ impl StartRegion {
         /// So many times around the grid a region may reach in a periodic direction.
         const MOST_TURNS: f64 = 64.0;
         if !(self.value.is_finite() && self.value >= 0.0) {
-            return Err(Error::usage(format!(
-                "the value of a start region is {}; it must be 0 or more",
-                self.value
-            )));
+            return Err(Error::argument("the value of a start region", self.value, "0 or more"));
         }
         let far = MOST_TURNS * DVec2::new(tiling.cols as f64, tiling.rows as f64);
         let bad = |at: &DVec2| {
@@ -143,7 +142,11 @@ impl StartRegion {
             !at.is_finite() || (across && at.x.abs() > far.x) || (down && at.y.abs() > far.y)
         };
         match self.vertices().find(bad) {
-            Some(at) => Err(Error::usage(format!("the start {at} is no place on the grid"))),
+            Some(at) => Err(Error::argument(
+                "a point of the start",
+                at,
+                format!("finite, and at most {MOST_TURNS} turns around a grid that is periodic"),
+            )),
             None => Ok(()),
         }
     }

@@ -50,7 +50,7 @@ impl TensorField {
     /// Samples a metric at the nodes of its surface, periodic where that is. Nodes within metres of a pole, where cells have no width, are closed.
     ///
     /// # Errors
-    /// [`Error::Usage`] if the metric has no quadratic form, a closed direction fewer than 3 nodes, or a tensor is too far from
+    /// [`Error::Argument`] if the metric has no quadratic form, a closed direction fewer than 3 nodes, or a tensor is too far from
     /// what is typical, as in [`set`](Self::set); cancelled.
     pub fn sample(metric: &MetricField<'_>, control: &Control) -> Result<Self> {
         metric.check_quadratic()?;
@@ -74,7 +74,7 @@ impl TensorField {
     /// closed node.
     ///
     /// # Errors
-    /// [`Error::Usage`] if a tensor is too far from what is typical, as in [`set`](Self::set); cancelled.
+    /// [`Error::Argument`] if a tensor is too far from what is typical, as in [`set`](Self::set); cancelled.
     pub fn from_fn(
         cols: usize,
         rows: usize,
@@ -101,13 +101,15 @@ impl TensorField {
     /// same place. A line or an area of a start that crosses the seam goes on beyond the grid.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there are fewer than 3 nodes in a periodic direction.
+    /// [`Error::Argument`] if there are fewer than 3 nodes in a periodic direction.
     pub fn periodic(mut self, directions: [bool; 2]) -> Result<Self> {
         for (periodic, count) in directions.into_iter().zip([self.cols(), self.rows()]) {
             if periodic && count < 3 {
-                return Err(Error::usage(format!(
-                    "the number of nodes in a periodic direction is {count}; it must be 3 or more"
-                )));
+                return Err(Error::argument(
+                    "the number of nodes in a periodic direction",
+                    count,
+                    "3 or more",
+                ));
             }
         }
         self.tiling.periodic = directions;
@@ -219,11 +221,11 @@ impl TensorField {
     /// Gives a node another tensor in index coordinates, or closes it (`None`, or a tensor that is not positive definite).
     ///
     /// # Errors
-    /// [`Error::Usage`] if the node is not on the grid, or a diagonal entry or the determinant of the tensor more than 10¹⁵ times
+    /// [`Error::Argument`] if the node is not on the grid, or a diagonal entry or the determinant of the tensor more than 10¹⁵ times
     /// larger or smaller than was typical of the field when it was made.
     pub fn set(&mut self, col: usize, row: usize, tensor: Option<Sym2>) -> Result<()> {
         if col >= self.cols() || row >= self.rows() {
-            return Err(Error::usage(format!("the node ({col}, {row}) is not on the grid")));
+            return Err(Error::argument("the node", "not on the grid", "on it").at_node(col, row));
         }
         let open = tensor.filter(|d| d.is_positive_definite());
         let d = open.unwrap_or_default() * self.root_scale.powi(-2);
@@ -292,14 +294,18 @@ struct Cells {
 fn too_far(col: usize, row: usize, count: u64) -> Error {
     let others = match count {
         1 => String::new(),
-        2 => " and at another node".into(),
-        _ => format!(" and at {} other nodes", count - 1),
+        2 => ", as is that at another node".into(),
+        _ => format!(", as are those at {} other nodes", count - 1),
     };
-    Error::usage(format!(
-        "the speed tensor at column {col}, row {row}{others} has entries or a determinant more than 1e15 times larger or \
-         smaller than is typical, which cannot be computed with; make such nodes barriers (NaN or nodata), or let the \
-         speeds differ less"
-    ))
+    Error::argument(
+        "the speed tensor",
+        format!(
+            "one with entries or a determinant more than 1e15 times larger or smaller than is typical{others}"
+        ),
+        "nearer to what is typical",
+    )
+    .at_node(col, row)
+    .advise("make such nodes barriers (NaN or nodata), or let the speeds differ less")
 }
 
 /// A row whose cells are so many times narrower than those in the middle lies at a pole.

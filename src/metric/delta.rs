@@ -34,7 +34,7 @@ impl Delta {
         if value.is_finite() && value > 0.0 {
             Ok(value)
         } else {
-            Err(Error::usage(format!("{what} is {value}; it must be positive and finite")))
+            Err(Error::argument(what, value, "positive and finite"))
         }
     }
 

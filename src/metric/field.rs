@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::modifiers::{Bound, Modifiers};
 use super::{Metric, Norm, Parameter, SpeedBlock, SpeedTensor, Unit};
 use crate::control::Control;
-use crate::error::{Error, Result};
+use crate::error::{Error, Obstacle, Result};
 use crate::linalg::Sym2;
 use crate::surface::{BLOCK, Block, Jet, Surface};
 
@@ -84,6 +84,13 @@ impl<'a> MetricField<'a> {
         has_tensor && self.modifiers.is_open(col, row)
     }
 
+    /// What closes nodes of this surface, as far as it is known; not the metric's own tensors, where some are missing.
+    #[must_use]
+    pub fn obstacles(&self) -> Vec<Obstacle> {
+        let voids = self.surface.has_voids().then_some(Obstacle::Void);
+        voids.into_iter().chain(self.modifiers.obstacles().iter().copied()).collect()
+    }
+
     /// Speed tensor `D` in the [axes](Surface::axes) of the surface at grid coordinates, from its exact derivatives there.
     /// Where closed, that of the continued surface. `None` where there is none, and on a metric without a quadratic form.
     #[must_use]
@@ -128,11 +135,11 @@ impl<'a> MetricField<'a> {
     pub(crate) fn check_quadratic(&self) -> Result<()> {
         match self.norm.tensor() {
             Some(_) => Ok(()),
-            None => Err(Error::usage(format!(
-                "the metric {} has no quadratic form: a step and the step back may cost differently; distances and routes are \
-                 computed on metrics that are given by a speed tensor",
-                self.name
-            ))),
+            None => Err(Error::argument(
+                format!("the metric {}", self.name),
+                "one without a quadratic form, under which a step and the step back may cost differently",
+                "one that is given by a speed tensor, for distances and routes to be computed on it",
+            )),
         }
     }
 

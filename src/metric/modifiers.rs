@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::nodes::Nodes;
 use super::{SpeedBlock, Unit};
-use crate::error::{Error, Result};
+use crate::error::{Error, Obstacle, Result};
 use crate::linalg::Sym2;
 use crate::linalg::simd::{self, Kernel};
 use crate::surface::{BLOCK, Block, HeightBlock, Jet, JetBlock, Surface};
@@ -36,6 +36,7 @@ pub(super) struct Bound {
     nodes: Nodes,
     climb_weight: f64,
     cost: Option<Arc<[f32]>>,
+    obstacles: Vec<Obstacle>,
     /// Row-major; empty if all are open.
     open: Vec<bool>,
 }
@@ -47,15 +48,26 @@ impl Modifiers {
     pub(super) fn on(&self, surface: &dyn Surface) -> Result<Bound> {
         let climb_weight = self.climb_weight;
         if !(climb_weight.is_finite() && climb_weight >= 0.0) {
-            return Err(Error::usage(format!(
-                "the climb weight is {climb_weight}; it must be 0 or more"
-            )));
+            return Err(Error::argument("the climb weight", climb_weight, "0 or more"));
         }
         if let Some(cost) = &self.cost {
             check_costs(surface, cost)?;
         }
-        let open = self.open_nodes(surface)?;
-        Ok(Bound { nodes: Nodes::of(surface), climb_weight, cost: self.cost.clone(), open })
+        Ok(Bound {
+            nodes: Nodes::of(surface),
+            climb_weight,
+            cost: self.cost.clone(),
+            obstacles: self.obstacles(),
+            open: self.open_nodes(surface)?,
+        })
+    }
+
+    /// What may close nodes.
+    fn obstacles(&self) -> Vec<Obstacle> {
+        let barrier = self.barrier.as_ref().map(|_| Obstacle::Barrier);
+        let slope = self.max_slope_deg.map(|_| Obstacle::Slope);
+        let no_value = self.cost.as_ref().map(|_| Obstacle::NoValue);
+        [barrier, slope, no_value].into_iter().flatten().collect()
     }
 
     /// Which nodes are neither void nor barrier, have a cost and are not too steep; empty if all are so.
@@ -64,10 +76,11 @@ impl Modifiers {
         if let Some(barrier) = &self.barrier
             && barrier.len() != nodes
         {
-            return Err(Error::usage(format!(
-                "the barrier has {} cells, the terrain {nodes}",
-                barrier.len()
-            )));
+            return Err(Error::argument(
+                "the number of cells of the barrier",
+                barrier.len(),
+                format!("{nodes}, that of the nodes"),
+            ));
         }
         let steepest = self.steepest_gradient()?;
         let any_closed = surface.has_voids()
@@ -98,9 +111,11 @@ impl Modifiers {
             Some(degrees) if degrees > 0.0 && degrees <= 90.0 => {
                 Ok(Some(degrees.to_radians().tan()))
             }
-            Some(degrees) => Err(Error::usage(format!(
-                "the steepest slope is {degrees}°; it must lie between 0 and 90"
-            ))),
+            Some(degrees) => Err(Error::argument(
+                "the steepest slope",
+                format!("{degrees}°"),
+                "above 0 and up to 90°",
+            )),
             None => Ok(None),
         }
     }
@@ -124,6 +139,11 @@ impl Bound {
     /// The unit of distances in `unit` once the modifiers weigh them.
     pub(super) fn unit(&self, unit: Unit) -> Unit {
         if self.climb_weight == 0.0 && self.cost.is_none() { unit } else { unit.weighted() }
+    }
+
+    /// What may close nodes, but voids.
+    pub(super) fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
     }
 
     pub(super) fn is_open(&self, col: usize, row: usize) -> bool {
@@ -229,31 +249,33 @@ pub(super) fn averse_to_climb(
 fn check_costs(surface: &dyn Surface, costs: &[f32]) -> Result<()> {
     let (cols, nodes) = (surface.cols(), surface.cols() * surface.rows());
     if costs.len() != nodes {
-        return Err(Error::usage(format!(
-            "the cost raster has {} cells, the terrain {nodes}; they must cover the same grid",
-            costs.len()
-        )));
+        return Err(Error::argument(
+            "the number of costs",
+            costs.len(),
+            format!("{nodes}, that of the nodes"),
+        ));
     }
     if let Some(i) = costs.iter().position(|cost| cost.is_finite() && *cost <= 0.0) {
-        return Err(Error::usage(format!(
-            "the cost {} at column {}, row {} is not above 0 (use NaN or nodata for barriers)",
-            costs[i],
-            i % cols,
-            i / cols
-        )));
+        return Err(Error::argument("the cost", costs[i], "above 0")
+            .at_node(i % cols, i / cols)
+            .advise(MARK_BARRIERS));
     }
     let (least, most) = costs
         .iter()
         .filter(|cost| cost.is_finite())
         .fold((f32::INFINITY, 0f32), |(least, most), &cost| (least.min(cost), most.max(cost)));
     if most > MOST_COST_RATIO * least {
-        return Err(Error::usage(format!(
-            "the costs run from {least} to {most}; more than 1 to {MOST_COST_RATIO} cannot be computed with \
-             (use NaN or nodata for barriers)"
-        )));
+        return Err(Error::argument(
+            "the range of the costs",
+            format!("{least} to {most}"),
+            format!("as wide as 1 to {MOST_COST_RATIO} at most"),
+        )
+        .advise(MARK_BARRIERS));
     }
     Ok(())
 }
+
+const MARK_BARRIERS: &str = "mark barriers by NaN or nodata";
 
 /// The solver keeps `det D`, which goes with the fourth power of the cost, within 1e±15 of what is typical.
 const MOST_COST_RATIO: f32 = 1000.0;

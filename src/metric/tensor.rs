@@ -14,7 +14,11 @@ pub(super) const NAMED: NamedMetric = NamedMetric {
     about: "Your own speed tensors at the nodes, in AG units",
     make: |options: &MetricOptions| match &options.tensors {
         Some(tensors) => Ok(Box::new(Tensor { tensors: Arc::clone(tensors) })),
-        None => Err(Error::usage("the metric `tensor` needs the tensors at the nodes")),
+        None => Err(Error::argument(
+            "the tensors of the metric `tensor`",
+            "missing",
+            "given, one at each node",
+        )),
     },
 };
 
@@ -47,26 +51,24 @@ impl Metric for Tensor {
 fn check_tensors(surface: &dyn Surface, tensors: &[Sym2]) -> Result<()> {
     let (cols, rows) = (surface.cols(), surface.rows());
     if tensors.len() != cols * rows {
-        return Err(Error::usage(format!(
-            "the tensor raster has {} cells, the surface {cols} columns × {rows} rows; they must cover the same grid",
-            tensors.len()
-        )));
+        return Err(Error::argument(
+            "the number of tensors",
+            tensors.len(),
+            format!("{}, that of the nodes", cols * rows),
+        ));
     }
     let finite = |d: &Sym2| d.xx.is_finite() && d.xy.is_finite() && d.yy.is_finite();
     match tensors.iter().position(|d| finite(d) && !d.is_positive_definite()) {
         None => Ok(()),
         Some(i) => {
             let d = tensors[i];
-            Err(Error::usage(format!(
-                "the tensor D = [{} {}; {} {}] at column {}, row {} is not positive definite; every speed \
-                 tensor needs D11 > 0 and D11·D22 > D12² (use NaN for barriers)",
-                d.xx,
-                d.xy,
-                d.xy,
-                d.yy,
-                i % cols,
-                i / cols
-            )))
+            Err(Error::argument(
+                "the tensor D",
+                format!("[{} {}; {} {}]", d.xx, d.xy, d.xy, d.yy),
+                "positive definite: D11 > 0 and D11·D22 > D12²",
+            )
+            .at_node(i % cols, i / cols)
+            .advise("mark barriers by NaN"))
         }
     }
 }

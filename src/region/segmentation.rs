@@ -370,11 +370,11 @@ mod tests {
             (2, &[1.0, 2.0]),
         ] {
             let refused = cut(&field, levels, epsilons);
-            assert!(matches!(refused, Err(Error::Usage(_))), "{levels} {epsilons:?}");
+            assert!(matches!(refused, Err(Error::Argument(_))), "{levels} {epsilons:?}");
         }
         assert!(cut(&plane("..\n.."), 1, &[]).is_err());
         let short = Segmentation::of(&field, &[0.0; 3], &Default::default(), &Control::default());
-        assert!(matches!(short, Err(Error::Usage(_))));
+        assert!(matches!(short, Err(Error::Argument(_))));
         let control = Control::default();
         control.cancel.cancel();
         let cancelled = Segmentation::of(&field, &[0.0; 4], &SegmentOptions::default(), &control);

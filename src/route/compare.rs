@@ -23,7 +23,7 @@ impl Comparison {
     /// Solves every metric with `solver` from the nearest of `starts` over the whole grid and traces its route to `goal` (grid coordinates).
     ///
     /// # Errors
-    /// [`Error::NoWay`](crate::Error::NoWay), and those of [`Solver::solve`].
+    /// [`Error::NoPath`](crate::Error::NoPath), and those of [`Solver::solve`].
     pub fn between(
         solver: Solver,
         metrics: &[MetricField<'_>],

@@ -15,7 +15,7 @@ pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
 use crate::eikonal::DistanceMap;
 use crate::eikonal::{TensorField, sees};
-use crate::error::{Error, Result};
+use crate::error::{Error, Location, Result};
 use crate::linalg::Sym2;
 use crate::metric::MetricField;
 
@@ -42,16 +42,17 @@ pub struct Route {
 /// begins at the image of the start that is nearest to the goal.
 ///
 /// # Errors
-/// [`Error::NoWay`] if the front did not reach the goal; [`Error::Usage`] if the goal is not on the grid or the metric has no
+/// [`Error::NoPath`] if the front did not reach the goal; [`Error::Argument`] if the goal is not on the grid or the metric has no
 /// quadratic form.
 pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> Result<Route> {
     metric.check_quadratic()?;
     let grid = shortest(distance, goal, &|at| metric.grid_metric(at))?.ok_or_else(|| {
-        let at = metric.surface().frame().map_or(goal, |frame| frame.to_map(goal));
-        Error::NoWay(format!(
-            "there is no way from the start to the goal at {}, {}: voids, barriers or too steep ground lie between",
-            at.x, at.y
-        ))
+        let frame = metric.surface().frame();
+        Error::NoPath {
+            goal: frame.map_or(Location::Grid(goal), |frame| Location::Map(frame.to_map(goal))),
+            between: metric.obstacles(),
+            nearest: None,
+        }
     })?;
     Ok(Route::from_line(grid, metric))
 }
@@ -67,13 +68,12 @@ fn shortest(
 ) -> Result<Option<Vec<DVec2>>> {
     let field = &distance.field;
     if !field.tiling.contains(goal) {
-        return Err(Error::usage(format!(
-            "the goal at column {}, row {} is not on the grid of {} columns × {} rows",
-            goal.x,
-            goal.y,
-            field.cols(),
-            field.rows()
-        )));
+        return Err(Error::argument(
+            "the goal",
+            "not on the grid",
+            format!("on its {} columns × {} rows", field.cols(), field.rows()),
+        )
+        .at(Location::Grid(goal)));
     }
     let inside = |at| field.tiling.contains(at);
     let clear = |a, b| inside(a) && inside(b) && (is_open_around(field, a, b) || sees(field, a, b));
@@ -129,7 +129,7 @@ mod tests {
             });
             for outside in [DVec2::new(-1.0, 3.0), DVec2::new(1e9, 3.0), DVec2::NAN] {
                 let error = trace(&distance, &field, outside).unwrap_err();
-                assert!(matches!(error, Error::Usage(_)), "{error}");
+                assert!(matches!(error, Error::Argument(_)), "{error}");
             }
             let mean = ratios.sum::<f64>() / 20.0;
             assert!(mean < 1.0 - shorter, "{metric:?}: {mean}");

@@ -328,7 +328,7 @@ fn too_few_nodes_and_too_many_turns_are_errors() {
     };
     let f = closed(20, 20, [true, false], |_, _| Some(IDENTITY));
     let solved = Solver::default().solve_field(f, &[around], &Stop::Never, &Control::default());
-    assert!(matches!(solved, Err(Error::Usage(_))));
+    assert!(matches!(solved, Err(Error::Argument(_))));
 }
 
 proptest! {

@@ -59,12 +59,14 @@ impl HeightSurface {
             options.smoothing
             && !(x.is_finite() && x > 0.0)
         {
-            return Err(Error::usage(format!(
-                "{x} is no cut-off length or tolerance; it must be positive and finite"
-            )));
+            return Err(Error::argument(
+                "the cut-off length or tolerance",
+                x,
+                "positive and finite",
+            ));
         }
         if !heights.iter().any(|z| z.is_finite()) {
-            return Err(Error::usage("all heights are void; there is no surface to fit"));
+            return Err(Error::argument("the number of heights that are not void", 0, "1 or more"));
         }
         let cell = mean_cell(&frame);
         let degree = options.degree.number();

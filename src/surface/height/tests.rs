@@ -473,10 +473,10 @@ fn impossible_wishes_are_refused() {
         for smoothing in
             [Smoothing::Cutoff(bad), Smoothing::CutoffCells(bad), Smoothing::Tolerance(bad)]
         {
-            assert!(matches!(fit(&[0.0; 16], smoothing), Err(Error::Usage(_))));
+            assert!(matches!(fit(&[0.0; 16], smoothing), Err(Error::Argument(_))));
         }
     }
-    assert!(matches!(fit(&[f64::NAN; 16], Smoothing::Interpolate), Err(Error::Usage(_))));
+    assert!(matches!(fit(&[f64::NAN; 16], Smoothing::Interpolate), Err(Error::Argument(_))));
     let control = Control::default();
     control.cancel.cancel();
     let cancelled =
