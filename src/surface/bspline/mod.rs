@@ -1,7 +1,7 @@
 //! Tensor-product B-splines: least squares along rows and then columns.
 //!
 //! [`basis`] has the splines of one axis, [`banded`] the solver, [`fit`] the fit and its derivatives, [`voids`] the heights
-//! that have no weight, [`knots`] the choice of knots and smoothing; [`block`] evaluates many nodes at once, [`residuals`] says
+//! that have no weight, [`knots`] knots and smoothing, [`selection`] their choice by the data; [`block`] evaluates many nodes at once, [`residuals`] says
 //! how well a surface fits.
 
 pub(in crate::surface) mod banded;
@@ -10,4 +10,5 @@ pub(in crate::surface) mod block;
 pub(in crate::surface) mod fit;
 pub(in crate::surface) mod knots;
 pub(in crate::surface) mod residuals;
+pub(in crate::surface) mod selection;
 pub(in crate::surface) mod voids;
