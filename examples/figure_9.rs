@@ -16,7 +16,7 @@ use std::time::Instant;
 use glam::DVec3;
 use ridgeway::Control;
 use ridgeway::region::{Match, Neighbours, matches, signatures};
-use ridgeway::render::{Rgb, SurfacePicture, beside, pair_colour, png};
+use ridgeway::render::{Rgb, SurfacePicture, beside, encode_png, pair_colour};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let views = [DVec3::new(0.3, -1.0, 2.0), DVec3::new(1.0, -2.0, 1.0)];
@@ -68,5 +68,5 @@ fn draw(cuts: &[parts::Cut; 2], found: &[Match], view: DVec3) -> Result<Vec<u8>,
         picture.title = cut.name.into();
         pictures.push(picture.render()?);
     }
-    png(&beside(&pictures)?)
+    encode_png(&beside(&pictures)?)
 }

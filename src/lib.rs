@@ -63,18 +63,25 @@
 //!
 //! # Features
 //!
-//! * `cli` (default): the `ridgeway` command. A library user can do without: `default-features = false`.
+//! Without features (`default-features = false`) a DEM is read, a surface fitted, distances solved and routes traced.
+//!
+//! * `export`: files of routes, isolines, regions and rasters ([`export`]).
+//! * `render`: pictures ([`render`]).
+//! * `zip`: SRTM tiles are read from zip archives too.
+//! * `cli` (default): the `ridgeway` command, with all of the above.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod control;
 pub mod eikonal;
 pub mod error;
+#[cfg(feature = "export")]
 pub mod export;
 pub mod grid;
 pub mod linalg;
 pub mod metric;
 pub mod region;
+#[cfg(feature = "render")]
 pub mod render;
 pub mod route;
 pub mod surface;

@@ -1,6 +1,7 @@
 //! A raster of pixels and the few shapes that our pictures need.
 
 use glam::Vec2;
+use image::RgbaImage;
 use rayon::prelude::*;
 use tiny_skia::{
     Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, Transform,
@@ -60,8 +61,10 @@ impl Canvas {
         Ok(Self { pixels })
     }
 
-    pub(super) fn into_pixmap(self) -> Pixmap {
-        self.pixels
+    /// The finished picture. All of it is opaque, so premultiplied colours are plain ones.
+    pub(super) fn into_image(self) -> RgbaImage {
+        let (width, height) = (self.pixels.width(), self.pixels.height());
+        RgbaImage::from_raw(width, height, self.pixels.take()).expect("four bytes for each pixel")
     }
 
     /// Sets each pixel of a rectangle to `colour(x, y)`, counted from its corner at `left`, `top`.
@@ -158,31 +161,4 @@ fn polyline_path(points: &[Vec2], closed: bool) -> Option<Path> {
         path.close();
     }
     path.finish()
-}
-
-/// The opaque picture as PNG, 8 bits per channel without alpha.
-///
-/// # Errors
-/// [`Error::Argument`] if it cannot be encoded.
-pub fn png(pixels: &Pixmap) -> Result<Vec<u8>> {
-    let rgb: Vec<u8> = pixels.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, pixels.width(), pixels.height());
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    encoder
-        .write_header()
-        .and_then(|mut writer| {
-            writer.write_image_data(&rgb)?;
-            writer.finish()
-        })
-        .map_err(|e| {
-            Error::argument(
-                "the picture",
-                format!("not to be encoded ({e})"),
-                "one that PNG can hold",
-            )
-        })?;
-    Ok(out)
 }

@@ -1,10 +1,11 @@
 //! A field in colour, such as distance, slope or curvature, with a colour bar.
 
 use glam::DVec2;
-use tiny_skia::Pixmap;
+use image::RgbaImage;
 
-use super::canvas::{self, Rgb};
+use super::canvas::Rgb;
 use super::layout::{Item, MapLayout, SIDE};
+use super::png::encode_png;
 use super::relief::VOID;
 use super::text::number;
 use crate::control::Control;
@@ -108,7 +109,7 @@ impl<'a> FieldPicture<'a> {
     ///
     /// # Errors
     /// [`Error::Argument`] if there is not one value per node or the size is out of bounds; cancelled.
-    pub fn render(&self) -> Result<Pixmap> {
+    pub fn render(&self) -> Result<RgbaImage> {
         if self.values.len() != self.frame.nodes() {
             return Err(Error::argument(
                 "the number of values",
@@ -144,7 +145,7 @@ impl<'a> FieldPicture<'a> {
     /// # Errors
     /// As [`render`](Self::render).
     pub fn png(&self) -> Result<Vec<u8>> {
-        canvas::png(&self.render()?)
+        encode_png(&self.render()?)
     }
 
     /// The value at grid coordinates: that of the nearest node (a field may be discontinuous).

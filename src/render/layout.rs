@@ -1,8 +1,8 @@
 //! The page of a picture: title above, map, and a footer of scale bar, north arrow and legend.
 
 use glam::{DVec2, Vec2};
+use image::RgbaImage;
 use rayon::prelude::*;
-use tiny_skia::Pixmap;
 
 use super::canvas::{Canvas, Rgb};
 use super::relief::VOID;
@@ -166,12 +166,12 @@ impl MapLayout {
     }
 
     /// The finished picture.
-    pub(super) fn finish(mut self) -> Pixmap {
+    pub(super) fn finish(mut self) -> RgbaImage {
         let [left, top, w, h] = self.map.map(|v| v as f32);
         let corners = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h], [0.0, 0.0]]
             .map(|c| Vec2::from(c) + Vec2::new(left, top));
         self.canvas.lines(&[corners.to_vec()], self.unit, Rgb(0x77, 0x77, 0x77), 1.0);
-        self.canvas.into_pixmap()
+        self.canvas.into_image()
     }
 }
 

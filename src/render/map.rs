@@ -1,10 +1,11 @@
 //! A map: shaded terrain, regions, isolines, routes, start and goal.
 
 use glam::{DVec2, Vec2};
-use tiny_skia::Pixmap;
+use image::RgbaImage;
 
-use super::canvas::{self, Rgb};
+use super::canvas::Rgb;
 use super::layout::{Item, MapLayout, SIDE};
+use super::png::encode_png;
 use super::regions::RegionLayer;
 use super::relief::Relief;
 use super::text;
@@ -92,7 +93,7 @@ impl<'a> MapPicture<'a> {
     ///
     /// # Errors
     /// [`Error::Argument`] if heights or barriers are not one per node, or the size is out of bounds; cancelled.
-    pub fn render(&self) -> Result<Pixmap> {
+    pub fn render(&self) -> Result<RgbaImage> {
         let nodes = self.frame.nodes();
         if self.heights.len() != nodes || ![0, nodes].contains(&self.barriers.len()) {
             return Err(Error::argument(
@@ -127,7 +128,7 @@ impl<'a> MapPicture<'a> {
     /// # Errors
     /// As [`render`](Self::render).
     pub fn png(&self) -> Result<Vec<u8>> {
-        canvas::png(&self.render()?)
+        encode_png(&self.render()?)
     }
 
     /// What the pin of a goal bears.
@@ -301,8 +302,8 @@ mod tests {
         let layout = MapLayout::new(&frame, "", 1600, []).unwrap();
         let pixel = |grid: DVec2, off: f32| {
             let at = layout.place(grid);
-            let p = picture.pixel(at.x as u32, (at.y + off) as u32).unwrap();
-            Rgb(p.red(), p.green(), p.blue())
+            let [r, g, b, _] = picture.get_pixel(at.x as u32, (at.y + off) as u32).0;
+            Rgb(r, g, b)
         };
         assert_eq!(pixel(DVec2::new(50.0, 25.0), 0.0), Rgb::BLUE);
         assert_eq!(pixel(way[0], 11.5), Rgb::GREEN);

@@ -8,14 +8,16 @@ mod field;
 mod layout;
 mod map;
 mod plot;
+mod png;
 mod regions;
 mod relief;
 mod surface;
 mod text;
 
-pub use self::canvas::{Rgb, png};
+pub use self::canvas::Rgb;
 pub use self::field::{FieldPicture, Gradient};
 pub use self::map::{IsolineLayer, MapPicture, RouteLayer};
 pub use self::plot::{LogPlot, Mark, pair_colour};
+pub use self::png::encode_png;
 pub use self::regions::{RegionLayer, contrasting_colours};
 pub use self::surface::{SurfacePicture, beside};

@@ -1,11 +1,12 @@
 //! Surfaces in space: shaded, coloured by node, seen from afar.
 
 use glam::{DVec2, DVec3, Vec2};
+use image::RgbaImage;
 use rayon::prelude::*;
-use tiny_skia::{Pixmap, PixmapPaint, Transform};
 
-use super::canvas::{self, Canvas, Rgb};
+use super::canvas::{Canvas, Rgb};
 use super::layout::{SIDE, SIDES};
+use super::png::encode_png;
 use super::regions::draw_numbers;
 use super::text;
 use crate::error::{Error, Result};
@@ -69,7 +70,7 @@ impl<'a> SurfacePicture<'a> {
     /// # Errors
     /// [`Error::Argument`] if there is not one colour, or region, per node, the size is out of bounds, the view has no direction, or there is
     /// nothing to see.
-    pub fn render(&self) -> Result<Pixmap> {
+    pub fn render(&self) -> Result<RgbaImage> {
         let (cols, rows) = (self.surface.cols(), self.surface.rows());
         if self.colours.len() != cols * rows {
             return Err(Error::argument(
@@ -129,7 +130,7 @@ impl<'a> SurfacePicture<'a> {
     /// # Errors
     /// As [`render`](Self::render).
     pub fn png(&self) -> Result<Vec<u8>> {
-        canvas::png(&self.render()?)
+        encode_png(&self.render()?)
     }
 
     /// The nodes of a row as they are seen; `None` where void.
@@ -158,15 +159,14 @@ impl std::fmt::Debug for SurfacePicture<'_> {
 ///
 /// # Errors
 /// [`Error::Argument`] if there is none or they are too large together.
-pub fn beside(pictures: &[Pixmap]) -> Result<Pixmap> {
-    let width = pictures.iter().map(Pixmap::width).sum();
-    let height = pictures.iter().map(Pixmap::height).max().unwrap_or(0);
-    let mut all = Canvas::new(width, height)?.into_pixmap();
+pub fn beside(pictures: &[RgbaImage]) -> Result<RgbaImage> {
+    let width = pictures.iter().map(RgbaImage::width).sum();
+    let height = pictures.iter().map(RgbaImage::height).max().unwrap_or(0);
+    let mut all = Canvas::new(width, height)?.into_image();
     let mut left = 0;
     for picture in pictures {
-        let paint = PixmapPaint::default();
-        all.draw_pixmap(left, 0, picture.as_ref(), &paint, Transform::identity(), None);
-        left += picture.width() as i32;
+        image::imageops::replace(&mut all, picture, left, 0);
+        left += i64::from(picture.width());
     }
     Ok(all)
 }
@@ -337,7 +337,7 @@ impl Film {
     }
 
     /// The finished picture: means of the samples, and the title.
-    fn develop(&self, title: &str) -> Result<Pixmap> {
+    fn develop(&self, title: &str) -> Result<RgbaImage> {
         let (width, height) = (self.width / SAMPLES, self.height / SAMPLES);
         let text_size = 0.03 * width.max(height) as f32;
         let head = if title.is_empty() { 0 } else { (2.0 * text_size) as usize };
@@ -365,7 +365,7 @@ impl Film {
             Rgb::INK,
             0.0,
         );
-        Ok(canvas.into_pixmap())
+        Ok(canvas.into_image())
     }
 }
 
@@ -382,18 +382,15 @@ mod tests {
         let colours: Vec<Rgb> = (0..800)
             .map(|i| if (i % 40 + 10) % 40 < 20 { Rgb::BLUE } else { Rgb::ORANGE })
             .collect();
-        for (view, blue) in [(DVec3::X, true), (-DVec3::X, false)] {
+        for (view, is_blue) in [(DVec3::X, true), (-DVec3::X, false)] {
             let mut picture = SurfacePicture::new(&tube, &colours);
             (picture.view, picture.max_side_px, picture.blend) = (view, 200, false);
-            picture.points.push((DVec2::new(if blue { 20.0 } else { 0.0 }, 10.0), Rgb::GREEN));
+            picture.points.push((DVec2::new(if is_blue { 20.0 } else { 0.0 }, 10.0), Rgb::GREEN));
             let pixels = picture.render().unwrap();
-            let at = pixels.pixel(100, 100).unwrap();
-            assert_eq!(at.blue() > at.red(), blue);
-            assert_eq!(pixels.pixel(2, 2).unwrap().red(), 255);
-            assert!(
-                pixels.pixels().iter().all(|p| p.green() <= p.red().max(p.blue())),
-                "a hidden point"
-            );
+            let [red, _, blue, _] = pixels.get_pixel(100, 100).0;
+            assert_eq!(blue > red, is_blue);
+            assert_eq!(pixels.get_pixel(2, 2).0[0], 255);
+            assert!(pixels.pixels().all(|p| p[1] <= p[0].max(p[2])), "a hidden point");
         }
         let one = SurfacePicture::new(&tube, &colours).render().unwrap();
         assert_eq!(one.width().max(one.height()), 1600);

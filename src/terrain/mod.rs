@@ -20,6 +20,7 @@ mod terrain;
 
 pub use self::bands::{RasterBands, read_bands};
 pub use self::crs::Crs;
+#[cfg(feature = "export")]
 pub(crate) use self::crs::GeoKeys;
 pub use self::georeference::Georeference;
 pub use self::raster::Source;

@@ -8,7 +8,7 @@ use ridgeway::region::{
     Level, Match, Neighbours, Signature, matches, matches_within, outlines, signatures,
 };
 use ridgeway::render::{
-    LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, pair_colour, png,
+    LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, encode_png, pair_colour,
 };
 use ridgeway::surface::{NurbsGrid, NurbsSurface};
 use ridgeway::{Control, Error, Modifiers, Result, Surface, Terrain};
@@ -176,7 +176,7 @@ fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
             picture.render()
         }
     };
-    png(&beside(&subjects.iter().zip(colours).map(picture).collect::<Result<Vec<_>>>()?)?)
+    encode_png(&beside(&subjects.iter().zip(colours).map(picture).collect::<Result<Vec<_>>>()?)?)
 }
 
 /// The two largest eigenvalues of all regions.

@@ -178,6 +178,7 @@ impl Crs {
     /// there is neither.
     ///
     /// The horizontal part only, as heights are in metres here, and always for `PixelIsArea`.
+    #[cfg(any(feature = "export", test))]
     pub(crate) fn geo_keys(&self) -> GeoKeys {
         match (&self.keys, self.epsg) {
             (Some(keys), _) => GeoKeys::clone(keys),

@@ -52,6 +52,7 @@ pub(in crate::terrain) mod key {
 
 impl GeoKeys {
     /// The keys that name an EPSG code (OGC 19-008r4, sections 7.4 and 7.5); none if it does not fit 16 bits.
+    #[cfg(any(feature = "export", test))]
     pub(super) fn from_epsg(code: u32, geographic: bool) -> Self {
         let Ok(code) = u16::try_from(code) else { return Self::default() };
         // 1 is projected, 2 geographic.

@@ -3,7 +3,7 @@
 //! A tile covers one degree, its outermost nodes lie on the full degrees, and −32768 is a void (*SRTM
 //! Topography*, USGS, section 2).
 
-use std::io::{Cursor, Read};
+use std::io::Read;
 use std::path::Path;
 
 use glam::DVec2;
@@ -102,17 +102,38 @@ fn gunzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
 }
 
 /// Unpacks the one tile of a zip archive.
+#[cfg(feature = "zip")]
 fn unzip(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
-    let damaged = |e: zip::result::ZipError| Error::damaged("the zip archive", e).in_file(path);
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(damaged)?;
-    for i in 0..archive.len() {
-        let file = archive.by_index(i).map_err(damaged)?;
-        if file.name().map_err(damaged)?.to_ascii_lowercase().ends_with(".hgt") {
-            return at_most_a_tile(path, file);
+    use rawzip::{CompressionMethod, ZipArchive};
+
+    let damaged = |cause: rawzip::Error| Error::damaged("the zip archive", cause).in_file(path);
+    let archive = ZipArchive::from_slice(bytes).map_err(damaged)?;
+    let mut entries = archive.entries();
+    while let Some(entry) = entries.next_entry().map_err(damaged)? {
+        if !entry.file_path().as_bytes().to_ascii_lowercase().ends_with(b".hgt") {
+            continue;
         }
+        let tile = archive.get_entry(entry.wayfinder()).map_err(damaged)?;
+        return match entry.compression_method() {
+            CompressionMethod::STORE => at_most_a_tile(path, tile.verifying_reader(tile.data())),
+            CompressionMethod::DEFLATE => {
+                let plain = flate2::bufread::DeflateDecoder::new(tile.data());
+                at_most_a_tile(path, tile.verifying_reader(plain))
+            }
+            _ => Err(unpack_first(path, "a zip archive packed by another method than Deflate")),
+        };
     }
     let expected = "1 or more";
     Err(Error::argument("the number of .hgt files in the zip archive", 0, expected).in_file(path))
+}
+
+#[cfg(not(feature = "zip"))]
+fn unzip(path: &Path, _: &[u8]) -> Result<Vec<u8>> {
+    Err(unpack_first(path, "a zip archive, which is read with the feature `zip` only"))
+}
+
+fn unpack_first(path: &Path, found: &str) -> Error {
+    Error::unsupported_file(path, found, "unpack it first")
 }
 
 /// Unpacks to the size of the largest tile and a byte more, whatever the archive claims.

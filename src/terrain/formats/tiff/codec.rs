@@ -68,7 +68,7 @@ impl Codec {
             }
             Self::Zstd => {
                 let stream =
-                    zstd::stream::read::Decoder::with_buffer(stored).map_err(|e| e.to_string())?;
+                    ruzstd::decoding::StreamingDecoder::new(stored).map_err(|e| e.to_string())?;
                 stream.take(length as u64).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
             }
         }
