@@ -54,7 +54,7 @@ impl GeoKeys {
     }
 
     /// A CRS of which only the unit is known, and perhaps a code.
-    pub(super) fn named_crs(&self) -> Option<Crs> {
+    fn named_crs(&self) -> Option<Crs> {
         self.short(key::LINEAR_UNITS)?;
         let metres = self.metres_per_unit().ok()?;
         Some(Crs {
@@ -63,7 +63,7 @@ impl GeoKeys {
         })
     }
 
-    pub(super) fn user_projected_crs(&self) -> Result<Crs> {
+    fn user_projected_crs(&self) -> Result<Crs> {
         let name = self.crs_name();
         let metres = self.metres_per_unit()?;
         let plain = Crs::named(&name, &unit_name(metres), metres);
@@ -81,7 +81,7 @@ impl GeoKeys {
         })
     }
 
-    pub(super) fn user_geographic_crs(&self) -> Result<Crs> {
+    fn user_geographic_crs(&self) -> Result<Crs> {
         let unit = self.short(key::ANGULAR_UNITS).unwrap_or(9102);
         if !matches!(unit, 9102 | 9122) {
             let found = format!("EPSG unit {unit}");
