@@ -219,10 +219,7 @@ pub(crate) fn fit(
     args: &FitArgs,
     control: &Control,
 ) -> Result<HeightSurface> {
-    HeightSurface::fit(terrain, &args.options(), control).map_err(|error| match error {
-        Error::Usage(message) => Error::format(dem, message),
-        error => error,
-    })
+    HeightSurface::fit(terrain, &args.options(), control).map_err(|error| error.in_file(dem))
 }
 
 /// The surface that was fitted, in words.
