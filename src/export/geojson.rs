@@ -2,27 +2,28 @@
 
 use ::geojson::{Feature, FeatureCollection, GeometryValue, JsonObject, Position};
 use glam::{DVec2, DVec3};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 
+use super::antimeridian::{cut_at_antimeridian, unwrap_ring};
 use super::round;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::{GridFrame, Isoline};
 use crate::region::Polygon;
 use crate::route::Route;
 use crate::terrain::Crs;
 
 /// A feature per `(name, route)` whose properties are `name` and all of the route's summary.
-/// `provenance`, a JSON object, becomes the collection's member of that name: what is needed to make
-/// the run again.
+/// `provenance` becomes the collection's member of that name: what is needed to make the run again.
 ///
 /// Without a CRS the positions are map coordinates, and the member `coordinate_note` says so.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::Error::Argument) if only some of the points can be brought to longitude and latitude.
+/// [`Error::Argument`] if only some of the points can be brought to longitude and latitude, or `provenance` is not JSON.
 pub fn routes_geojson(
     routes: &[(impl AsRef<str>, &Route)],
     crs: &Crs,
-    provenance: &Value,
+    provenance: &impl Serialize,
 ) -> Result<String> {
     let features = routes.iter().map(|(name, route)| route_feature(name.as_ref(), route)).collect();
     collection(features, |map| crs.to_lonlat(map), provenance)
@@ -37,27 +38,31 @@ pub fn isolines_geojson(
     frame: &GridFrame,
     unit: &str,
     crs: &Crs,
-    provenance: &Value,
+    provenance: &impl Serialize,
 ) -> Result<String> {
     let drawn = isolines.iter().filter(|isoline| !isoline.lines.is_empty());
     let features = drawn.map(|isoline| isoline_feature(isoline, frame, unit)).collect();
     collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
-/// A feature per region, given by its properties, a JSON object, and its polygons; `frame` places them. Rings run as RFC 7946 wants them;
+/// A feature per region, given by its properties and its polygons; `frame` places them. Rings run as RFC 7946 wants them;
 /// one that crosses 180° goes on beyond it.
 ///
 /// # Errors
-/// As [`routes_geojson`].
+/// As [`routes_geojson`]; [`Error::Argument`] if properties are not a JSON object.
 pub fn regions_geojson(
-    regions: &[(JsonObject, Vec<Polygon>)],
+    regions: &[(impl Serialize, Vec<Polygon>)],
     frame: &GridFrame,
     crs: &Crs,
-    provenance: &Value,
+    provenance: &impl Serialize,
 ) -> Result<String> {
-    let features =
-        regions.iter().map(|(properties, polygons)| region_feature(properties, polygons, frame));
-    collection(features.collect(), |map| crs.to_lonlat(map), provenance)
+    let features = regions
+        .iter()
+        .map(|(properties, polygons)| {
+            Ok(region_feature(object("the properties of a region", properties)?, polygons, frame))
+        })
+        .collect::<Result<_>>()?;
+    collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
 /// A geometry in map coordinates (z: height, or `NaN` for none) and its properties.
@@ -81,25 +86,29 @@ impl Geometry {
         line?.first().copied()
     }
 
+    /// In longitude and latitude: lines are cut where they cross 180°, rings go on beyond it.
     fn in_degrees(&self, to_lonlat: impl Fn(DVec2) -> Result<DVec2>) -> Result<Self> {
-        Ok(match self {
-            Self::Lines(lines) => Self::Lines(in_degrees(lines, to_lonlat)?),
-            Self::Areas(areas) => {
-                let ring = |ring: &Vec<DVec3>| ring_in_degrees(ring, &to_lonlat);
-                let area = |rings: &Vec<Vec<DVec3>>| rings.iter().map(ring).collect();
-                Self::Areas(areas.iter().map(area).collect::<Result<_>>()?)
+        match self {
+            Self::Lines(lines) => {
+                let mut parts = Vec::new();
+                for line in lines {
+                    parts.extend(cut_at_antimeridian(&in_degrees(line, &to_lonlat)?));
+                }
+                Ok(Self::Lines(parts))
             }
-        })
+            Self::Areas(areas) => {
+                let ring = |ring: &Vec<DVec3>| Ok(unwrap_ring(in_degrees(ring, &to_lonlat)?));
+                let area = |rings: &Vec<Vec<DVec3>>| rings.iter().map(ring).collect();
+                Ok(Self::Areas(areas.iter().map(area).collect::<Result<_>>()?))
+            }
+        }
     }
 }
 
 fn route_feature(name: &str, route: &Route) -> Shape {
     let mut properties = JsonObject::new();
     properties.insert("name".into(), name.into());
-    let summary = serde_json::to_value(&route.summary).expect("numbers and texts are JSON");
-    if let Value::Object(summary) = summary {
-        properties.extend(summary);
-    }
+    properties.extend(object("the summary", &route.summary).expect("named numbers and texts"));
     // A route of one point, start and goal being the same, is still a line of two positions.
     let mut line = route.points.clone();
     if let [only] = line[..] {
@@ -117,31 +126,32 @@ fn isoline_feature(isoline: &Isoline, frame: &GridFrame, unit: &str) -> Shape {
     Shape { geometry: Geometry::Lines(isoline.lines.iter().map(place).collect()), properties }
 }
 
-fn region_feature(properties: &JsonObject, polygons: &[Polygon], frame: &GridFrame) -> Shape {
+fn region_feature(properties: JsonObject, polygons: &[Polygon], frame: &GridFrame) -> Shape {
     let place =
         |ring: &Vec<DVec2>| ring.iter().map(|&p| frame.to_map(p).extend(f64::NAN)).collect();
     let rings = |polygon: &Polygon| {
         std::iter::once(&polygon.exterior).chain(&polygon.holes).map(place).collect()
     };
     let geometry = Geometry::Areas(polygons.iter().map(rings).collect());
-    Shape { geometry, properties: properties.clone() }
+    Shape { geometry, properties }
 }
 
 fn collection(
     features: Vec<Shape>,
     to_lonlat: impl Fn(DVec2) -> Result<DVec2>,
-    provenance: &Value,
+    provenance: &impl Serialize,
 ) -> Result<String> {
     let first = features.iter().find_map(|f| f.geometry.first());
     let no_lonlat = first.and_then(|p| to_lonlat(p.truncate()).err());
     let mut members = JsonObject::new();
-    members.insert("provenance".into(), provenance.clone());
+    members.insert("provenance".into(), json("the provenance", provenance)?);
     if let Some(reason) = &no_lonlat {
         members.insert(
             "coordinate_note".into(),
-            json!(format!(
+            format!(
                 "positions are the DEM's map coordinates, not longitude and latitude: {reason}"
-            )),
+            )
+            .into(),
         );
     }
     let geographic = no_lonlat.is_none();
@@ -157,37 +167,21 @@ fn collection(
     Ok(collection.to_string())
 }
 
-/// Lines in longitude and latitude, cut where they cross 180°.
-fn in_degrees(
-    lines: &[Vec<DVec3>],
-    to_lonlat: impl Fn(DVec2) -> Result<DVec2>,
-) -> Result<Vec<Vec<DVec3>>> {
-    let mut parts = Vec::new();
-    for line in lines {
-        let degrees = line
-            .iter()
-            .map(|p| Ok(to_lonlat(p.truncate())?.extend(p.z)))
-            .collect::<Result<Vec<_>>>()?;
-        parts.extend(cut_at_antimeridian(&degrees));
+fn object(what: &str, value: &impl Serialize) -> Result<JsonObject> {
+    match json(what, value)? {
+        Value::Object(object) => Ok(object),
+        other => Err(Error::argument(what, other, "a JSON object")),
     }
-    Ok(parts)
 }
 
-/// A ring in longitude and latitude, going the short way round from each position to the next.
-fn ring_in_degrees(
-    ring: &[DVec3],
-    to_lonlat: impl Fn(DVec2) -> Result<DVec2>,
-) -> Result<Vec<DVec3>> {
-    let mut before: Option<f64> = None;
-    let mut position = |p: &DVec3| {
-        let mut here = to_lonlat(p.truncate())?;
-        if let Some(before) = before {
-            here.x -= 360.0 * ((here.x - before) / 360.0).round();
-        }
-        before = Some(here.x);
-        Ok(here.extend(p.z))
-    };
-    ring.iter().map(&mut position).collect()
+fn json(what: &str, value: &impl Serialize) -> Result<Value> {
+    serde_json::to_value(value)
+        .map_err(|e| Error::argument(what, format!("no JSON ({e})"), "a JSON object"))
+}
+
+/// A line or ring in longitude and latitude.
+fn in_degrees(line: &[DVec3], to_lonlat: impl Fn(DVec2) -> Result<DVec2>) -> Result<Vec<DVec3>> {
+    line.iter().map(|p| Ok(to_lonlat(p.truncate())?.extend(p.z))).collect()
 }
 
 fn value(geometry: &Geometry) -> GeometryValue {
@@ -212,37 +206,11 @@ fn position(p: DVec3) -> Position {
     if p.z.is_finite() { Position::from([x, y, round(p.z, 2)]) } else { Position::from([x, y]) }
 }
 
-/// Cuts a line (longitude, latitude, height) where it crosses 180°, as RFC 7946 section 3.1.9 asks.
-/// Longitudes may be given beyond ±180; two successive ones are taken to go the short way round.
-fn cut_at_antimeridian(line: &[DVec3]) -> Vec<Vec<DVec3>> {
-    let wrap = |p: DVec3| DVec3::new(p.x - 360.0 * (p.x / 360.0).round(), p.y, p.z);
-    let mut parts = vec![Vec::new()];
-    let mut last: Option<DVec3> = None;
-    for here in line.iter().map(|&p| wrap(p)) {
-        if let Some(before) = last.filter(|l| (here.x - l.x).abs() > 180.0) {
-            // `side` is the edge of the map left through: 180 going east, −180 going west.
-            let side = 180f64.copysign(before.x);
-            let unwrapped = here + DVec3::new(360f64.copysign(before.x), 0.0, 0.0);
-            let t = (side - before.x) / (unwrapped.x - before.x);
-            let edge = before.lerp(unwrapped, t);
-            parts.last_mut().expect("never empty").push(edge.with_x(side));
-            parts.push(vec![edge.with_x(-side)]);
-        }
-        parts.last_mut().expect("never empty").push(here);
-        last = Some(here);
-    }
-    // A line that only touches 180° leaves a part of no length.
-    let has_length = |part: &Vec<DVec3>| part.iter().any(|p| p.truncate() != part[0].truncate());
-    if parts.len() > 1 {
-        parts.retain(has_length);
-    }
-    parts
-}
-
 #[cfg(test)]
 pub(super) mod tests {
+    use serde_json::json;
+
     use super::*;
-    use crate::error::Error;
     use crate::grid::Ground;
     use crate::metric::Unit;
     use crate::route::Summary;
@@ -323,15 +291,6 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn touching_the_date_line_cuts_nothing() {
-        let line = [[-179.0, 0.0], [180.0, 0.0], [-179.0, 1.0]];
-        let line: Vec<_> = line.iter().map(|p| DVec3::new(p[0], p[1], 0.0)).collect();
-        let parts = cut_at_antimeridian(&line);
-        assert!(parts.iter().all(|part| part.iter().all(|p| p.x < 0.0)), "{parts:?}");
-        assert_eq!(cut_at_antimeridian(&line[..1]).len(), 1);
-    }
-
-    #[test]
     fn regions_are_polygons_with_holes() {
         let square = |from: f64, to: f64| {
             [(from, to), (to, to), (to, from), (from, from), (from, to)].map(DVec2::from).to_vec()
@@ -345,7 +304,7 @@ pub(super) mod tests {
         let mut properties = JsonObject::new();
         properties.insert("region".into(), 7.into());
         let wrapped = |p: DVec2| Ok(DVec2::new(p.x - 360.0 * (p.x / 360.0).round(), p.y));
-        let features = vec![region_feature(&properties, &[polygon], &frame)];
+        let features = vec![region_feature(properties, &[polygon], &frame)];
         let text = collection(features, wrapped, &Value::Null).unwrap();
         let json: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(json["features"][0]["properties"]["region"], 7);

@@ -3,6 +3,7 @@
 //! Nothing here decides where a file goes: the functions make content, [`write_file`] and
 //! [`write_folder`] put it in place whole or not at all.
 
+mod antimeridian;
 mod atomic;
 mod geojson;
 mod geotiff;
