@@ -207,7 +207,7 @@ impl Tiling {
 }
 
 /// The place of `at` among `count`, counted on around them if they are periodic.
-fn wrap(at: isize, count: usize, periodic: bool) -> Option<usize> {
+pub(crate) fn wrap(at: isize, count: usize, periodic: bool) -> Option<usize> {
     match usize::try_from(at) {
         Ok(at) if at < count => Some(at),
         _ => periodic.then(|| at.rem_euclid(count as isize) as usize),

@@ -56,7 +56,7 @@ pub fn cluster(
 
 /// Clusters that together hold all open nodes.
 #[derive(Debug)]
-pub(super) struct Cover {
+pub(super) struct SeedCover {
     /// Their seeds, as places in the row-major grid.
     pub(super) seeds: Vec<usize>,
     /// Their radius, in the unit of the metric.
@@ -69,12 +69,12 @@ pub(super) struct Cover {
 ///
 /// # Errors
 /// More than [`MOST`] clusters; cancelled.
-pub(super) fn cover(
+pub(super) fn seed_cover(
     field: &TensorField,
     ranks: &[f64],
     epsilon: Option<f64>,
     control: &Control,
-) -> Result<Cover> {
+) -> Result<SeedCover> {
     let cols = field.cols();
     let is_open = |&(_, node): &(f64, usize)| field.is_open(node % cols, node / cols);
     let mut order: Vec<_> = ranks.iter().copied().zip(0..).filter(is_open).collect();
@@ -105,7 +105,7 @@ pub(super) fn cover(
         held.for_each(|(place, _)| is_held[place] = true);
         seeds.push(seed);
     }
-    Ok(Cover { seeds, epsilon })
+    Ok(SeedCover { seeds, epsilon })
 }
 
 /// Refuses clusters of which [`MOST`] hold only so many of the open nodes.
@@ -145,7 +145,7 @@ mod tests {
         let control = Control::default();
         let tensor = |_: usize, _: usize| Some(Sym2::new(1.0, 0.0, 1.0));
         let field = TensorField::from_fn(300, 300, tensor, &control).unwrap();
-        let refusal = cover(&field, &vec![0.0; 300 * 300], Some(0.0), &control).unwrap_err();
+        let refusal = seed_cover(&field, &vec![0.0; 300 * 300], Some(0.0), &control).unwrap_err();
         assert!(refusal.to_string().contains("72.8 %"), "{refusal}");
         let refusal = too_small(0.2, 2 * MOST + 1, 8 * MOST);
         assert!(refusal.to_string().ends_with("one of 0.6 may do"), "{refusal}");

@@ -3,6 +3,7 @@
 use super::{Level, Neighbours, Segmentation, signatures};
 use crate::control::Control;
 use crate::error::{Error, Result};
+use crate::grid::tiling::wrap;
 use crate::surface::Surface;
 
 impl Segmentation {
@@ -49,14 +50,11 @@ impl Level {
     /// Pairs of regions with one parent that share a side of a cell, the lower first.
     fn siblings(&self, cols: usize, [across, down]: [bool; 2]) -> Vec<[u32; 2]> {
         let rows = self.labels.len() / cols;
-        let next = |at: usize, count: usize, periodic: bool| {
-            if at + 1 < count { Some(at + 1) } else { periodic.then_some(0) }
-        };
         let mut pairs = Vec::new();
         for (place, label) in self.labels.iter().enumerate() {
             let (col, row) = (place % cols, place / cols);
-            let east = next(col, cols, across).map(|col| row * cols + col);
-            let south = next(row, rows, down).map(|row| row * cols + col);
+            let east = wrap(col as isize + 1, cols, across).map(|col| row * cols + col);
+            let south = wrap(row as isize + 1, rows, down).map(|row| row * cols + col);
             for other in [east, south].into_iter().flatten() {
                 if let (Some(a), Some(b)) = (*label, self.labels[other])
                     && a != b

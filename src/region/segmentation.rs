@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::clusters::{cover, node};
+use super::clusters::{node, seed_cover};
 use crate::control::Control;
 use crate::eikonal::TensorField;
 use crate::eikonal::{Solver, StartRegion, Stop};
@@ -116,13 +116,13 @@ impl Segmentation {
         }
         let mut parts = vec![open];
         let mut levels = Vec::with_capacity(options.levels);
-        let surface = Surface { field, ranks, solver: options.solver, control };
+        let input = Input { field, ranks, solver: options.solver, control };
         for depth in 0..options.levels {
             let mut level = Level { labels: vec![None; ranks.len()], regions: Vec::new() };
             for (parent, part) in parts.iter().enumerate() {
                 control.report("segmenting", parent as f64 / parts.len() as f64);
                 let parent = (depth > 0).then_some(parent as u32);
-                level.cut(&surface, part, parent, options.epsilons.get(depth).copied())?;
+                level.cut(&input, part, parent, options.epsilons.get(depth).copied())?;
             }
             parts = level.parts();
             levels.push(level);
@@ -131,9 +131,9 @@ impl Segmentation {
     }
 }
 
-/// What is cut.
+/// What every part is cut by.
 #[derive(Debug)]
-struct Surface<'a> {
+struct Input<'a> {
     field: &'a TensorField,
     ranks: &'a [f64],
     solver: Solver,
@@ -144,12 +144,12 @@ impl Level {
     /// Adds the regions of one part of the grid, as if the rest were closed.
     fn cut(
         &mut self,
-        surface: &Surface<'_>,
+        input: &Input<'_>,
         part: &[usize],
         parent: Option<u32>,
         epsilon: Option<f64>,
     ) -> Result<()> {
-        let Surface { field, ranks, solver, control } = *surface;
+        let Input { field, ranks, solver, control } = *input;
         let cols = field.cols();
         let (mut field, first) = field.crop(spans(part, cols));
         let window = Window { first, cols: field.cols() };
@@ -161,7 +161,7 @@ impl Level {
         }
         field.restrict(|col, row| inside[row * window.cols + col]);
 
-        let cover = cover(&field, &window_ranks, epsilon, control)?;
+        let cover = seed_cover(&field, &window_ranks, epsilon, control)?;
         let starts: Vec<StartRegion> =
             cover.seeds.iter().map(|&seed| node(seed, window.cols).into()).collect();
         let map = solver.solve_field(field, &starts, &Stop::Never, &control.quiet())?;
@@ -189,14 +189,14 @@ impl Level {
     }
 }
 
-/// Gives the few nodes inside that have no label, where a way home was lost in rounding, that of a neighbour.
+/// Gives the few nodes inside without a label, whose predecessors were lost to rounding, that of a neighbour.
 fn fill(labels: &mut [Option<u32>], inside: &[bool], cols: usize) {
-    let mut bare: Vec<usize> =
+    let mut unlabelled: Vec<usize> =
         (0..labels.len()).filter(|&i| inside[i] && labels[i].is_none()).collect();
     let mut before = usize::MAX;
-    while bare.len() < before {
-        before = bare.len();
-        bare.retain(|&i| {
+    while unlabelled.len() < before {
+        before = unlabelled.len();
+        unlabelled.retain(|&i| {
             let beside = |&(x, y): &(isize, isize)| {
                 let col = (i % cols).checked_add_signed(x).filter(|&col| col < cols)?;
                 let row = (i / cols).checked_add_signed(y)?;

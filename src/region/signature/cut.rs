@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::control::Control;
 use crate::error::Result;
+use crate::grid::tiling::wrap;
 use crate::surface::Surface;
 use crate::surface::{BLOCK, Block, JetBlock, Lanes, SpaceLanes};
 
@@ -69,25 +70,10 @@ impl Cut<'_> {
         control: &Control,
         values: impl Fn(&Run<'_>, &mut [T; BLOCK]) + Sync,
     ) -> Result<Vec<T>> {
-        let of_band = |band: usize| {
-            let mut rows: [Vec<(u32, T)>; BLOCK] = Default::default();
-            let mut room = std::array::from_fn(|_| T::default());
-            self.visit(band * BLOCK, control, |run| {
-                values(run, &mut room);
-                let sums = &mut rows[run.node[1] % BLOCK];
-                for (value, label) in room.iter().zip(run.labels) {
-                    let Some(region) = *label else { continue };
-                    // Neighbours along a row are mostly of one region.
-                    match sums.last_mut() {
-                        Some((last, sum)) if *last == region => sum.add(value),
-                        _ => sums.push((region, value.clone())),
-                    }
-                }
-            });
-            rows
-        };
-        let bands = self.rows.div_ceil(BLOCK);
-        let bands: Vec<_> = (0..bands).into_par_iter().map(of_band).collect();
+        let bands: Vec<_> = (0..self.rows.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|band| self.sums_of_rows(band * BLOCK, control, &values))
+            .collect();
         control.check()?;
         let mut sums = vec![T::default(); self.regions];
         for (region, sum) in bands.iter().flatten().flatten() {
@@ -96,14 +82,33 @@ impl Cut<'_> {
         Ok(sums)
     }
 
+    /// The sums along each of [`BLOCK`] rows, one for as long as nodes of one region follow each other: mostly they do.
+    fn sums_of_rows<T: Sum>(
+        &self,
+        first: usize,
+        control: &Control,
+        values: impl Fn(&Run<'_>, &mut [T; BLOCK]),
+    ) -> [Vec<(u32, T)>; BLOCK] {
+        let mut rows: [Vec<(u32, T)>; BLOCK] = Default::default();
+        let mut of_nodes = std::array::from_fn(|_| T::default());
+        self.visit(first, control, |run| {
+            values(run, &mut of_nodes);
+            let sums = &mut rows[run.node[1] - first];
+            for (value, label) in of_nodes.iter().zip(run.labels) {
+                let Some(region) = *label else { continue };
+                match sums.last_mut() {
+                    Some((last, sum)) if *last == region => sum.add(value),
+                    _ => sums.push((region, value.clone())),
+                }
+            }
+        });
+        rows
+    }
+
     /// The node at a place beside the grid or in it.
     pub(super) fn node(&self, col: isize, row: isize) -> Option<usize> {
-        let within = |at: isize, count: usize, periodic: bool| match usize::try_from(at) {
-            Ok(at) if at < count => Some(at),
-            _ => periodic.then(|| at.rem_euclid(count as isize) as usize),
-        };
-        let [around, about] = self.periodic;
-        Some(within(row, self.rows, about)? * self.cols + within(col, self.cols, around)?)
+        let [across, down] = self.periodic;
+        Some(wrap(row, self.rows, down)? * self.cols + wrap(col, self.cols, across)?)
     }
 
     /// Whether each node is the first corner of a cell all of whose corners belong to one region; cells over a seam do not count.

@@ -69,22 +69,35 @@ pub(super) fn along_grid(
     run: &Run<'_>,
     moments: &mut [Moments; BLOCK],
 ) {
-    let of_node = |i: usize, region: u32| {
-        let [col, row] = [run.node[0] + i, run.node[1]].map(|at| at as isize);
-        let here = tensors.at(col, row, region)?;
-        let l = |to: Option<&Tensor>| Some(apart(here, to?).sqrt() / sizes[region as usize].side);
-        let pair = |x: isize, y: isize| {
-            let plus = l(tensors.at(col + x, row + y, region));
-            let minus = l(tensors.at(col - x, row - y, region));
-            Some([plus.or(minus)?, minus.or(plus)?])
-        };
-        let ([a, b], [c, d]) = (pair(1, 0)?, pair(0, 1)?);
-        let jet = run.jets.get(i);
-        jet.is_regular().then(|| Moments::of([a, b, c, d], jet.area()))
-    };
     for (i, label) in run.labels.iter().enumerate() {
-        moments[i] = label.and_then(|region| of_node(i, region)).unwrap_or_default();
+        let moments_of = |region: u32| {
+            let side = sizes[region as usize].side;
+            let node = [run.node[0] + i, run.node[1]];
+            let [a, b] = grid_differences(tensors, node, [1, 0], side, region)?;
+            let [c, d] = grid_differences(tensors, node, [0, 1], side, region)?;
+            let jet = run.jets.get(i);
+            jet.is_regular().then(|| Moments::of([a, b, c, d], jet.area()))
+        };
+        moments[i] = label.and_then(moments_of).unwrap_or_default();
     }
+}
+
+/// Differences to the two neighbours of a node on one line of the grid, as shares of `side`; one for both where the other is
+/// missing.
+fn grid_differences(
+    tensors: &Tensors<'_>,
+    node: [usize; 2],
+    [x, y]: [isize; 2],
+    side: f64,
+    region: u32,
+) -> Option<[f64; 2]> {
+    let [col, row] = node.map(|at| at as isize);
+    let here = tensors.at(col, row, region)?;
+    let [after, before] = [1, -1].map(|by| {
+        let there = tensors.at(col + by * x, row + by * y, region)?;
+        Some(apart(here, there).sqrt() / side)
+    });
+    Some([after.or(before)?, before.or(after)?])
 }
 
 /// How `C` changes around each node of a run: `⟨∂_i C, ∂_j C⟩` by grid coordinates. 0 along a line on which no neighbour is there.
@@ -113,20 +126,27 @@ fn changes(tensors: &Tensors<'_>, run: &Run<'_>) -> [Lanes; 3] {
 /// The same beside a border or a seam: one-sided where a neighbour is missing.
 #[inline(never)]
 fn changes_at_border(tensors: &Tensors<'_>, node: [usize; 2], region: u32) -> [f64; 3] {
+    let [x, y] = [[1, 0], [0, 1]].map(|line| derivative_at_border(tensors, node, line, region));
+    [(x, x), (x, y), (y, y)].map(|(a, b)| sum(std::array::from_fn(|k| a[k] * b[k])))
+}
+
+/// `∂C` along a line of the grid from what neighbours there are; 0 if there is none.
+fn derivative_at_border(
+    tensors: &Tensors<'_>,
+    node: [usize; 2],
+    [x, y]: [isize; 2],
+    region: u32,
+) -> Tensor {
     let [col, row] = node.map(|at| at as isize);
-    let slope = |x: isize, y: isize| {
-        let at = |by: isize| tensors.at(col + by * x, row + by * y, region);
-        let (before, after, step) = match [at(-1), at(0), at(1)] {
+    let (before, after, step) =
+        match [-1, 0, 1].map(|by| tensors.at(col + by * x, row + by * y, region)) {
             [Some(before), _, Some(after)] => (before, after, 2.0),
             [None, Some(before), Some(after)] | [Some(before), Some(after), None] => {
                 (before, after, 1.0)
             }
             _ => return [0.0; 6],
         };
-        std::array::from_fn(|k| (after[k] - before[k]) / step)
-    };
-    let (x, y): (Tensor, Tensor) = (slope(1, 0), slope(0, 1));
-    [(x, x), (x, y), (y, y)].map(|(a, b)| sum(std::array::from_fn(|k| a[k] * b[k])))
+    std::array::from_fn(|k| (after[k] - before[k]) / step)
 }
 
 /// Grid coordinates, columns and rows, of the four neighbours: along the geodesic `u + hv − h²/2 Γ(v, v)` for the unit tangents `v` in
@@ -137,10 +157,11 @@ fn neighbours(run: &Run<'_>, steps: &Lanes, changes: &[Lanes; 3]) -> [[Lanes; 2]
     for i in 0..BLOCK {
         let (jet, step) = (run.jets.get(i), steps[i]);
         let node = DVec2::new((run.node[0] + i) as f64, run.node[1] as f64);
-        let ways =
+        let directions =
             tangents(jet.first_form(), Sym2::new(changes[0][i], changes[1][i], changes[2][i]));
         for k in 0..2 {
-            let (by, middle) = (ways[k] * step, node - bend(&jet, ways[k]) * (0.5 * step * step));
+            let v = directions[k];
+            let (by, middle) = (v * step, node - bend(&jet, v) * (0.5 * step * step));
             let (plus, minus) = (middle + by, middle - by);
             [neighbours[2 * k][0][i], neighbours[2 * k][1][i]] = plus.to_array();
             [neighbours[2 * k + 1][0][i], neighbours[2 * k + 1][1][i]] = minus.to_array();
