@@ -1,8 +1,12 @@
 //! The solver against closed forms and against the slow reference.
 
+#[cfg(unix)]
+mod file_store;
+mod incremental;
 mod periodic;
 
 use std::f64::consts::TAU;
+use std::sync::Mutex;
 
 use glam::DVec2;
 use proptest::prelude::*;
@@ -12,8 +16,6 @@ use super::*;
 use crate::control::Control;
 use crate::error::Error;
 use crate::linalg::Sym2;
-
-mod incremental;
 
 const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
 
@@ -319,6 +321,63 @@ fn solves_side_by_side_are_as_alone() {
         });
         assert_eq!(together, alone);
     }
+}
+
+/// Begins three large solves and a small one at once; which are over, in that order, by the numbers of their columns.
+fn race(begin: impl Fn(&[&(dyn Fn() + Sync)])) -> Vec<usize> {
+    let tensor = |c: usize, r: usize| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64));
+    let (large, small) = (field(700, 700, tensor), field(70, 70, tensor));
+    let over = Mutex::new(Vec::new());
+    let run = |field: &TensorField| {
+        solve(field.clone(), DVec2::splat(33.3));
+        over.lock().unwrap().push(field.cols());
+    };
+    let (large, small) = (|| run(&large), || run(&small));
+    begin(&[&large, &large, &large, &small]);
+    over.into_inner().unwrap()
+}
+
+#[test]
+fn a_small_solve_is_over_before_large_ones_that_begin_with_it() {
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let in_the_pool = |solves: &[&(dyn Fn() + Sync)]| {
+            pool.in_place_scope(|scope| {
+                solves.iter().for_each(|&solve| scope.spawn(move |_| solve()));
+            });
+        };
+        assert_eq!(race(in_the_pool), [70, 700, 700, 700]);
+    }
+    let outside = |solves: &[&(dyn Fn() + Sync)]| {
+        std::thread::scope(|scope| solves.iter().for_each(|&solve| drop(scope.spawn(solve))));
+    };
+    assert_eq!(race(outside), [70, 700, 700, 700]);
+}
+
+#[test]
+fn cancelling_one_of_several_solves_does_not_disturb_the_others() {
+    let f = field(300, 300, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
+    let start = [StartRegion::from(DVec2::new(20.0, 90.5))];
+    let solve =
+        |control: &Control| Solver::default().solve_field(f.clone(), &start, &Stop::Never, control);
+    let alone = solve(&Control::default()).unwrap().values.tiles;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    pool.install(|| {
+        (0..8).into_par_iter().for_each(|i| {
+            let control = Control::default();
+            if i % 2 == 0 {
+                return assert_eq!(solve(&control).unwrap().values.tiles, alone);
+            }
+            let cancel = control.cancel.clone();
+            let progress = move |_: &str, done: f64| {
+                if done > 0.2 {
+                    cancel.cancel();
+                }
+            };
+            let control = Control { progress: Some(std::sync::Arc::new(progress)), ..control };
+            assert!(matches!(solve(&control), Err(Error::Cancelled)));
+        });
+    });
 }
 
 #[test]
