@@ -68,7 +68,7 @@ impl DistanceMap {
     }
 
     /// Estimate of the error of the distance at a node; `None` where not reached and if the accuracy was not
-    /// [`Accuracy::High`].
+    /// [`Accuracy::High`](super::Accuracy::High).
     #[must_use]
     pub fn error_at_node(&self, col: usize, row: usize) -> Option<f64> {
         let (tile, place) = self.field.tiling.place(col, row);
@@ -90,24 +90,25 @@ impl DistanceMap {
 
     /// Which tiles have other values than before; none, if there is nothing to correct.
     pub(super) fn differing(&self, before: Option<Values>) -> Vec<bool> {
-        let Some(before) = before else { return vec![false; self.values.tiles.len()] };
-        let pairs = before.tiles.par_iter().zip(&self.values.tiles);
-        pairs.map(|(before, after)| before != after).collect()
+        let tiles = self.field.tiling.tiles();
+        let Some(before) = before else { return vec![false; tiles] };
+        let differs = |tile| before.tile(tile) != self.values.tile(tile);
+        (0..tiles).into_par_iter().map(differs).collect()
     }
 
     /// Value at a node in the field's stored units, corrected.
     pub(super) fn value(&self, col: usize, row: usize) -> f32 {
         let (tile, place) = self.field.tiling.place(col, row);
         let correction = self.correction.as_ref().map_or(0.0, |all| all.at(tile, place));
-        self.values.tiles[tile][place] + correction
+        self.values.tile(tile)[place] + correction
     }
 
     /// Values at all nodes in the field's stored units, corrected.
     pub(super) fn corrected(&self) -> Values {
         let mut values = self.values.clone();
         let Some(correction) = &self.correction else { return values };
-        for (tile, nodes) in values.tiles.iter_mut().enumerate() {
-            for (place, value) in nodes.iter_mut().enumerate() {
+        for tile in 0..self.field.tiling.tiles() {
+            for (place, value) in values.tile_mut(tile).iter_mut().enumerate() {
                 *value += correction.at(tile, place);
             }
         }

@@ -173,7 +173,7 @@ fn moved_seeds<'a>(
 /// that brought it down, so that what it came from must not be taken away alone.
 fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize)> {
     let is_contested = |tile: &usize| {
-        let pairs = seeds[*tile].iter().flat_map(|seeds| seeds.iter()).zip(&values.tiles[*tile]);
+        let pairs = seeds[*tile].iter().flat_map(|seeds| seeds.iter()).zip(values.tile(*tile));
         pairs.into_iter().any(|(&seed, &value)| seed < UNREACHED && value < seed)
     };
     let tiles = (0..seeds.len()).filter(is_contested).flat_map(|tile| around(values, tile));
@@ -182,18 +182,18 @@ fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize
 
 /// A tile and its neighbours.
 fn around(values: &Values, tile: usize) -> impl Iterator<Item = usize> + '_ {
-    std::iter::once(tile).chain(values.tiling.neighbours(tile).map(|(_, n)| n))
+    std::iter::once(tile).chain(values.tiling().neighbours(tile).map(|(_, n)| n))
 }
 
 fn count_reached(values: &Values, tile: usize) -> usize {
-    values.tiles[tile].iter().filter(|&&value| value < UNREACHED).count()
+    values.tile(tile).iter().filter(|&&value| value < UNREACHED).count()
 }
 
 /// Takes the values of these nodes away; for each tile the least of them, or of those that a stop took away.
 fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
     let mut lost = stopped(&map.values);
     for &(tile, place) in nodes {
-        let value = &mut map.values.tiles[tile][place];
+        let value = &mut map.values.tile_mut(tile)[place];
         lost[tile] = lost[tile].min(value.min(UNREACHED));
         let open = map.field.tensors(tile).det[place] > 0.0;
         *value = if open { UNREACHED } else { f32::INFINITY };
@@ -205,9 +205,9 @@ fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
 /// is a segment of which one end may be farther than the node itself.
 fn stopped(values: &Values) -> Vec<f32> {
     let is_front = |tile: usize| {
-        values.tiles[tile].contains(&UNREACHED)
+        values.tile(tile).contains(&UNREACHED)
             && around(values, tile).any(|tile| count_reached(values, tile) > 0)
     };
     let key = |tile| if is_front(tile) { UNREACHED } else { f32::INFINITY };
-    (0..values.tiles.len()).into_par_iter().map(key).collect()
+    (0..values.tiling().tiles()).into_par_iter().map(key).collect()
 }

@@ -303,7 +303,7 @@ fn thread_count_changes_no_bit() {
     let one = run(1);
     for threads in [2, 4, 8] {
         let map = run(threads);
-        assert_eq!(map.values.tiles, one.values.tiles);
+        assert_eq!(map.values, one.values);
         assert_eq!(map.statistics(), one.statistics());
     }
 }
@@ -313,11 +313,11 @@ fn thread_count_changes_no_bit() {
 fn solves_side_by_side_are_as_alone() {
     let start = |i: usize| DVec2::new(20.0 + 15.0 * i as f64, 90.5);
     let f = field(200, 200, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
-    let alone: Vec<_> = (0..8).map(|i| solve(f.clone(), start(i)).values.tiles).collect();
+    let alone: Vec<_> = (0..8).map(|i| solve(f.clone(), start(i)).values).collect();
     for threads in [1, 2, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let together: Vec<_> = pool.install(|| {
-            (0..8).into_par_iter().map(|i| solve(f.clone(), start(i)).values.tiles).collect()
+            (0..8).into_par_iter().map(|i| solve(f.clone(), start(i)).values).collect()
         });
         assert_eq!(together, alone);
     }
@@ -360,13 +360,13 @@ fn cancelling_one_of_several_solves_does_not_disturb_the_others() {
     let start = [StartRegion::from(DVec2::new(20.0, 90.5))];
     let solve =
         |control: &Control| Solver::default().solve_field(f.clone(), &start, &Stop::Never, control);
-    let alone = solve(&Control::default()).unwrap().values.tiles;
+    let alone = solve(&Control::default()).unwrap().values;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     pool.install(|| {
         (0..8).into_par_iter().for_each(|i| {
             let control = Control::default();
             if i % 2 == 0 {
-                return assert_eq!(solve(&control).unwrap().values.tiles, alone);
+                return assert_eq!(solve(&control).unwrap().values, alone);
             }
             let cancel = control.cancel.clone();
             let progress = move |_: &str, done: f64| {
@@ -470,7 +470,7 @@ fn one_list_of_starts_is_one_region_of_all() {
     let control = Control::default();
     let one = Solver::default().solve_field(f(), &[one], &Stop::Never, &control).unwrap();
     let three = solve_from(f(), &points.map(|at| (at, 0.0)), &Stop::Never);
-    assert_eq!(one.values.tiles, three.values.tiles);
+    assert_eq!(one.values, three.values);
     assert!(one.labels().iter().all(|&label| label == Some(0)));
 }
 
@@ -552,7 +552,7 @@ fn stops_that_nothing_meets_solve_everything() {
         Stop::Nodes(usize::MAX),
     ] {
         let part = solve_from(rough(60, 40), &start, &stop);
-        assert_eq!(part.values.tiles, whole.values.tiles, "{stop:?}");
+        assert_eq!(part.values, whole.values, "{stop:?}");
     }
     let nowhere = solve_from(rough(60, 40), &start, &Stop::Distance(0.0));
     assert_eq!((assert_part(&nowhere, &whole), nowhere.at_node(8, 9)), (1, 0.0));

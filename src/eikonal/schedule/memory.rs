@@ -108,9 +108,10 @@ pub(crate) struct SharedValues {
 
 impl SharedValues {
     pub(crate) fn new(values: Values, outside: f32) -> Self {
-        let nodes = values.tiles.into_flattened();
+        let tiling = values.tiling();
+        let nodes = values.into_tiles().into_flattened();
         Self {
-            tiling: values.tiling,
+            tiling,
             outside,
             nodes: nodes.into_iter().map(|value| AtomicU32::new(value.to_bits())).collect(),
         }
@@ -119,7 +120,7 @@ impl SharedValues {
     pub(crate) fn into_values(self) -> Values {
         let nodes: Vec<f32> =
             self.nodes.into_iter().map(|bits| f32::from_bits(bits.into_inner())).collect();
-        Values { tiling: self.tiling, tiles: bytemuck::allocation::cast_vec(nodes) }
+        Values::new(self.tiling, bytemuck::allocation::cast_vec(nodes))
     }
 
     fn tile(&self, tile: usize) -> &[AtomicU32] {

@@ -90,7 +90,8 @@ fn activate_front(
 ) {
     let is_edited = |tile: usize| edited.get(tile).is_some_and(|&key| key < f32::INFINITY);
     let mut block = [[f32::INFINITY; BLOCK]; BLOCK];
-    for (tile, before) in before.tiles.iter().enumerate() {
+    for tile in 0..tiling.tiles() {
+        let before = before.tile(tile);
         let all = is_edited(tile) || tiling.neighbours(tile).any(|(_, n)| is_edited(n));
         if !all && !before.contains(&UNREACHED) {
             continue;

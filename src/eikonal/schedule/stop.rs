@@ -144,8 +144,8 @@ pub(crate) fn mask(
     stop: &Stop,
 ) {
     let largest = stop.largest(field);
-    for (tile, limits) in values.tiles.iter_mut().zip(limits) {
-        for value in tile.iter_mut().filter(|value| **value < UNREACHED) {
+    for (tile, limits) in limits.iter().enumerate() {
+        for value in values.tile_mut(tile).iter_mut().filter(|value| **value < UNREACHED) {
             if *value > largest || !is_final(*value, limits, least_change) {
                 *value = UNREACHED;
             }

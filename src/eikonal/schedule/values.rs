@@ -12,13 +12,33 @@ use crate::grid::tiling::{AREA, Tiling};
 const FEW: usize = 1024;
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Values {
-    pub(crate) tiling: Tiling,
-    pub(crate) tiles: Vec<[f32; AREA]>,
+    tiling: Tiling,
+    tiles: Vec<[f32; AREA]>,
 }
 
 impl Values {
+    pub(crate) fn new(tiling: Tiling, tiles: Vec<[f32; AREA]>) -> Self {
+        Self { tiling, tiles }
+    }
+
+    pub(crate) fn tiling(&self) -> Tiling {
+        self.tiling
+    }
+
+    pub(crate) fn tile(&self, tile: usize) -> &[f32; AREA] {
+        &self.tiles[tile]
+    }
+
+    pub(crate) fn tile_mut(&mut self, tile: usize) -> &mut [f32; AREA] {
+        &mut self.tiles[tile]
+    }
+
+    pub(crate) fn into_tiles(self) -> Vec<[f32; AREA]> {
+        self.tiles
+    }
+
     /// The start values; the rest unreached.
     pub(crate) fn seeded(field: &TensorField, seeds: &[Option<Box<Seeds>>]) -> Self {
         let start = |tile: usize| at_start(field.tensors(tile), seeds[tile].as_deref());

@@ -39,7 +39,10 @@ impl<'a> Domain<'a> {
         let strips = across.div_ceil(STRIP) * down;
         let mut domain = Self {
             solution,
-            keys: solution.values.tiles.par_iter().map(least_of).collect(),
+            keys: (0..solution.field.tiling.tiles())
+                .into_par_iter()
+                .map(|tile| least_of(solution.values.tile(tile)))
+                .collect(),
             // Moving feet to a larger place would take longer than finding some.
             strips: Vec::with_capacity(strips),
             places: vec![None; strips],

@@ -72,14 +72,14 @@ impl Surroundings {
     ) {
         let &FirstOrder { field, factors, values, seeds } = input.solution;
         let tiling = &field.tiling;
-        let reached = |tile: usize| values.tiles[tile].iter().any(|&g| g < UNREACHED);
+        let reached = |tile: usize| values.tile(tile).iter().any(|&g| g < UNREACHED);
         let tiles = feet.len();
         if !(first..first + tiles).any(reached) {
             feet.fill(Feet::NONE);
             return reads.fill(0);
         }
         let part = (first, tiles);
-        fill(&mut self.g, tiling, part, f32::INFINITY, |t| &values.tiles[t]);
+        fill(&mut self.g, tiling, part, f32::INFINITY, |t| values.tile(t));
         match input.total {
             Some(total) => fill(&mut self.e, tiling, part, 0.0, |t| &total[t]),
             None => self.e.as_flattened_mut().fill(0.0),

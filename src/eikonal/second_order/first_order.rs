@@ -19,7 +19,7 @@ pub(crate) struct FirstOrder<'a> {
 impl FirstOrder<'_> {
     /// The places of a tile that have nothing to correct: the start, and what is closed or not reached.
     pub(super) fn fixed(&self, tile: usize) -> impl Iterator<Item = usize> {
-        let (values, seeds) = (&self.values.tiles[tile], self.seeds[tile].as_deref());
+        let (values, seeds) = (self.values.tile(tile), self.seeds[tile].as_deref());
         let is_start = move |i: usize| seeds.is_some_and(|seeds| seeds[i] < UNREACHED);
         (0..AREA).filter(move |&i| values[i] >= UNREACHED || is_start(i))
     }

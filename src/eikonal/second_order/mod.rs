@@ -54,7 +54,7 @@ pub(super) struct Correction {
 
 impl Correction {
     pub(super) fn new(solution: &FirstOrder<'_>, control: &Control) -> Result<Self> {
-        let tiles = solution.values.tiles.len();
+        let tiles = solution.field.tiling.tiles();
         let nothing = || vec![[0.0; AREA]; tiles];
         let domain = Domain::around(solution, &vec![true; tiles]);
         Self::in_two_rounds(domain, nothing(), nothing(), control)
@@ -95,8 +95,9 @@ impl Correction {
         domain.widen();
         let mut total = round(&mut domain, second, Some(&first), TOLERANCE_CELLS[1], control)?;
         control.report("correcting distance", 1.0);
-        let values = &domain.solution.values.tiles;
-        total.par_iter_mut().zip(&first).zip(values).for_each(|((total, first), values)| {
+        let values = domain.solution.values;
+        total.par_iter_mut().zip(&first).enumerate().for_each(|(tile, (total, first))| {
+            let values = values.tile(tile);
             for i in 0..AREA {
                 // On ground so rough that the transport does not settle no distance is to be negative either.
                 total[i] = greatest(total[i] + first[i], -values[i]);

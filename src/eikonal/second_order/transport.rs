@@ -57,7 +57,7 @@ pub(super) fn carry(
     let mut beyond = Vec::new();
     let mut activations = vec![0u32; tiles];
     let mut round = 0;
-    let e = SharedValues::new(Values { tiling, tiles: e }, 0.0);
+    let e = SharedValues::new(Values::new(tiling, e), 0.0);
     let mut active = ActiveSet::new(tiles);
     let work = |_: &mut (), job: u64| {
         let tile = Job::from_bits(job).tile as usize;
@@ -104,7 +104,7 @@ pub(super) fn carry(
         Ok(())
     };
     worker_pool::run(tiles, lead, work)?;
-    Ok((e.into_values().tiles, beyond))
+    Ok((e.into_values().into_tiles(), beyond))
 }
 
 /// Carries the correction through a tile until it converges.

@@ -144,7 +144,7 @@ fn a_solve_in_files_has_the_bits_of_one_in_memory() {
             assert_eq!(statistics, map.statistics());
             for tile in 0..field.tiling.tiles() {
                 let values: [f32; AREA] = store.get(tile, 0).unwrap();
-                assert_eq!(values, map.values.tiles[tile]);
+                assert_eq!(&values, map.values.tile(tile));
             }
         }
     }

@@ -239,7 +239,7 @@ fn thread_count_changes_no_bit_of_an_update() {
     let [one, _] = run(1);
     for threads in [2, 4] {
         let [map, _] = run(threads);
-        assert_eq!(map.values.tiles, one.values.tiles);
+        assert_eq!(map.values, one.values);
         assert_eq!(map.statistics(), one.statistics());
     }
 }
