@@ -18,7 +18,7 @@ use crate::eikonal::tile::{BLOCK, Block, Limits};
 use crate::error::Result;
 use crate::grid::tiling::{AREA, SIDE, Tiling};
 
-/// A file for each tile: the numbers of its nodes, then [`Limits::slack`] and [`Limits::longest_step`].
+/// A file for each tile: the numbers of its nodes, then [`Limits::margin`] and [`Limits::longest_step`].
 struct FileStore {
     tiling: Tiling,
     folder: TempDir,
@@ -87,12 +87,12 @@ impl TileStore for FileStore {
     }
 
     fn limits(&self, tile: usize) -> Result<Limits> {
-        let [slack, longest_step] = self.get(tile, AREA)?;
-        Ok(Limits { slack, longest_step })
+        let [margin, longest_step] = self.get(tile, AREA)?;
+        Ok(Limits { margin, longest_step })
     }
 
-    fn set_limits(&self, tile: usize, &Limits { slack, longest_step }: &Limits) -> Result<()> {
-        self.put(tile, AREA, &[slack, longest_step])
+    fn set_limits(&self, tile: usize, &Limits { margin, longest_step }: &Limits) -> Result<()> {
+        self.put(tile, AREA, &[margin, longest_step])
     }
 }
 
