@@ -74,7 +74,7 @@ pub(crate) fn divide(surface: &HalfCylinders, metric: &dyn Metric) -> Result<(Ve
     let metric = metric.on(surface, &Modifiers::default(), &control)?;
     let seeds = surface.seeds().map(StartRegion::from);
     let map: DistanceMap = Solver::default().solve(&metric, &seeds, &Stop::Never, &control)?;
-    let second: Vec<bool> = map.labels().iter().map(|&label| label == Some(1)).collect();
+    let second: Vec<bool> = map.allocation().iter().map(|&label| label == Some(1)).collect();
     let right = (0..).zip(&second).filter(|(i, second)| {
         let col = i % surface.nodes;
         (col as f64 > surface.seam()) == **second

@@ -49,7 +49,7 @@ pub(crate) fn nearest_rings(surface: &NurbsGrid, rows: &[f64]) -> Result<Vec<Opt
     };
     let starts: Vec<_> = rows.iter().map(ring).collect();
     let metric = Difference::default().on(surface, &Modifiers::default(), &control)?;
-    Ok(Solver::default().solve(&metric, &starts, &Stop::Never, &control)?.labels())
+    Ok(Solver::default().solve(&metric, &starts, &Stop::Never, &control)?.allocation())
 }
 
 /// Two surfaces with like parts, and the names of the parts of each.

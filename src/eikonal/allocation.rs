@@ -1,14 +1,14 @@
-//! Which start region each node belongs to.
+//! Allocation: which start region each node belongs to.
 
 use super::distance_map::DistanceMap;
-use super::interpolation::SLACK;
+use super::interpolation::ROUNDED_UP;
 use super::predecessor::predecessors;
 use super::source;
 use super::stencil::ring::RING;
 
 /// Not looked at yet.
 const UNKNOWN: u32 = u32::MAX;
-/// On the way that is being followed.
+/// On the path that is being followed.
 const PENDING: u32 = u32::MAX - 1;
 /// No region: not reached.
 const NONE: u32 = u32::MAX - 2;
@@ -20,24 +20,24 @@ impl DistanceMap {
     /// A node has the region of the ring node nearest to the point its value came from, so borders between regions are
     /// right to about a cell.
     #[must_use]
-    pub fn labels(&self) -> Vec<Option<u32>> {
+    pub fn allocation(&self) -> Vec<Option<u32>> {
         let cols = self.cols();
         let mut labels = self.seed_labels();
         let predecessors = predecessors(&self.field, &self.factors, self.corrected());
-        let mut way = Vec::new();
+        let mut path = Vec::new();
         for first in 0..labels.len() {
             let mut at = first;
             while labels[at] == UNKNOWN {
                 labels[at] = PENDING;
-                way.push(at);
+                path.push(at);
                 match self.beside(at % cols, at / cols, predecessors[at]) {
                     Some((col, row)) => at = row * cols + col,
                     None => labels[at] = NONE,
                 }
             }
-            // A way in a circle, where a step is lost in the rounding of the values, leads nowhere.
+            // A path in a circle, where a step is lost in the rounding of the values, leads nowhere.
             let label = if labels[at] == PENDING { NONE } else { labels[at] };
-            way.drain(..).for_each(|node| labels[node] = label);
+            path.drain(..).for_each(|node| labels[node] = label);
         }
         labels.into_iter().map(|label| (label < NONE).then_some(label)).collect()
     }
@@ -50,7 +50,7 @@ impl DistanceMap {
         let seeds = |col: usize, row: usize, seed: f32, region: u32| {
             let label = &mut labels[row * self.cols() + col];
             let Some(metric) = self.field.metric(col, row) else { return };
-            let most = SLACK * self.stored(col, row) + LITTLE * metric.det().sqrt().sqrt();
+            let most = ROUNDED_UP * self.stored(col, row) + LITTLE * metric.det().sqrt().sqrt();
             if self.is_reached(col, row) && f64::from(seed) <= most {
                 *label = region.min(*label);
             }

@@ -14,7 +14,8 @@ impl DistanceMap {
         let mut best: Option<(f64, DVec2, f64)> = None;
         for (a, b) in self.borders(at) {
             let (pa, pb) = (point(a), point(b));
-            let value_of = |(c, r)| Some(self.reached(c, r)? + self.shift(at, point((c, r))));
+            let value_of =
+                |(c, r)| Some(self.reached(c, r)? + self.factoring_term(at, point((c, r))));
             let (ga, gb) = (value_of(a), value_of(b));
             let mut offer = |to: DVec2, g: f64| {
                 let sum = g + metric.norm(to - at);

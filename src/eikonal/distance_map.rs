@@ -1,8 +1,10 @@
 //! Distances at the nodes: what a solve comes to.
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::factors::Factors;
+use super::predecessor;
 use super::schedule::rounds::Statistics;
 use super::schedule::values::Values;
 use super::second_order::Correction;
@@ -81,6 +83,60 @@ impl DistanceMap {
     pub fn to_row_major(&self) -> Vec<f32> {
         let nodes = (0..self.rows()).flat_map(|row| (0..self.cols()).map(move |col| (col, row)));
         nodes.map(|(col, row)| self.at_node(col, row) as f32).collect()
+    }
+
+    /// Gradient of the distance at grid coordinates, in ground axes (x east, y north), per metre; `None` where
+    /// [`at`](Self::at) is. By differences over half a cell, one-sided beside walls and borders.
+    #[must_use]
+    pub fn gradient_at(&self, at: DVec2) -> Option<DVec2> {
+        const REACH: f64 = 0.25;
+        let here = self.at(at)?;
+        let slope = |by: DVec2| {
+            let (before, after) = (self.at(at - by), self.at(at + by));
+            let pieces = u8::from(before.is_some()) + u8::from(after.is_some());
+            let rise = after.unwrap_or(here) - before.unwrap_or(here);
+            (pieces > 0).then(|| rise / (REACH * f64::from(pieces)))
+        };
+        let (col, row) = (slope(REACH * DVec2::X)?, slope(REACH * DVec2::Y)?);
+        let spacing = self.field.spacing(at.y);
+        Some(DVec2::new(col, -row) / spacing)
+    }
+
+    /// Unit vector of travel away from the start at grid coordinates, in ground axes (x east, y north), along
+    /// `D ∇g`; `None` where [`gradient_at`](Self::gradient_at) is and on the start.
+    #[must_use]
+    pub fn direction_at(&self, at: DVec2) -> Option<DVec2> {
+        let spacing = self.field.spacing(at.y);
+        let gradient = self.gradient_at(at)? * spacing;
+        let speed = self.field.metric_at(at)?.inverse();
+        let step = speed.apply(DVec2::new(gradient.x, -gradient.y));
+        (DVec2::new(step.x, -step.y) * spacing).try_normalize()
+    }
+
+    /// Unit vector of travel away from the start at a node, in ground axes (x east, y north); `None` where not
+    /// reached and on the start.
+    #[must_use]
+    pub fn direction(&self, col: usize, row: usize) -> Option<DVec2> {
+        let spacing = self.field.spacing(row as f64);
+        let foot = self.foot(col as isize, row as isize)?;
+        (DVec2::new(-foot.x, foot.y) * spacing).try_normalize()
+    }
+
+    /// Step in grid coordinates from a node, as in [`reached`](Self::reached), to the point of its ring that its value came
+    /// from.
+    pub(crate) fn foot(&self, col: isize, row: isize) -> Option<DVec2> {
+        let value = self.reached(col, row)?;
+        let (col, row) = self.field.tiling.node(col, row)?;
+        let node = DVec2::new(col as f64, row as f64);
+        if let Some(foot) = self.straight_home(node, value) {
+            return Some(foot - node);
+        }
+        self.best_foot(col, row).map(|(_, foot)| foot)
+    }
+
+    /// Least value of a node over its ring, and the step to the point of the ring it came from.
+    pub(super) fn best_foot(&self, col: usize, row: usize) -> Option<(f64, DVec2)> {
+        predecessor::best_foot(&self.field, &self.factors, |c, r| self.value(c, r), col, row)
     }
 
     /// The values, if they have a correction that must follow when they change.

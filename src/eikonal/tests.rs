@@ -452,7 +452,7 @@ fn the_nearest_start_wins_its_value_included() {
         assert!(worst < 5e-3 && mean < 2e-3, "{worst} {mean}");
         let diagonals = [DVec2::ONE, DVec2::new(1.0, -1.0)];
         let cell = diagonals.map(|v| d.inverse().norm(v)).into_iter().fold(0.0, f64::max);
-        let labels = map.labels();
+        let labels = map.allocation();
         for (i, label) in labels.into_iter().enumerate() {
             let (c, r) = (i % 151, i / 151);
             let label = label.unwrap() as usize;
@@ -471,7 +471,7 @@ fn one_list_of_starts_is_one_region_of_all() {
     let one = Solver::default().solve_field(f(), &[one], &Stop::Never, &control).unwrap();
     let three = solve_from(f(), &points.map(|at| (at, 0.0)), &Stop::Never);
     assert_eq!(one.values, three.values);
-    assert!(one.labels().iter().all(|&label| label == Some(0)));
+    assert!(one.allocation().iter().all(|&label| label == Some(0)));
 }
 
 #[test]
@@ -723,7 +723,7 @@ proptest! {
             let _ = map.direction(i % cols, i / cols);
         }
         prop_assert!(map.at(DVec2::from(at)).is_none_or(|g| g >= 0.0));
-        for (label, g) in map.labels().into_iter().zip(map.to_row_major()) {
+        for (label, g) in map.allocation().into_iter().zip(map.to_row_major()) {
             prop_assert!(label.is_none_or(|label| (label as usize) < starts.len() && g.is_finite()));
         }
         let on = solver.resume(map, &Stop::Never, &control);
@@ -761,7 +761,7 @@ proptest! {
             };
             let Stop::Distance(most) = stop else { unreachable!() };
             prop_assert!(near(&part, most * (1.0 - 1e-5)) <= 1e-5);
-            let labels = part.labels();
+            let labels = part.allocation();
             for (i, label) in labels.into_iter().enumerate() {
                 prop_assert_eq!(label.is_some(), part.is_reached(i % 60, i / 60));
             }

@@ -165,7 +165,7 @@ impl Level {
         let starts: Vec<StartRegion> =
             cover.seeds.iter().map(|&seed| node(seed, window.cols).into()).collect();
         let map = solver.solve_field(field, &starts, &Stop::Never, &control.quiet())?;
-        let mut labels = map.labels();
+        let mut labels = map.allocation();
         fill(&mut labels, &inside, window.cols);
         let first = self.regions.len() as u32;
         for &place in part {

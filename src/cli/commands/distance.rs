@@ -50,7 +50,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     }
     if let Some(path) = &args.labels {
         let labels: Vec<u32> =
-            map.labels().into_iter().map(|label| label.map_or(0, |label| label + 1)).collect();
+            map.allocation().into_iter().map(|label| label.map_or(0, |label| label + 1)).collect();
         let bands = [("nearest start".into(), Samples::U32(&labels))];
         write_raster(path, args.overwrite, &journey.georeference, &bands)?;
     }

@@ -281,7 +281,7 @@ fn labels_stops_and_resuming_work_around_the_seam() {
     let f = || closed(cols, rows, [true, true], wavy(cols, rows, 4.0));
     let starts = [(DVec2::new(128.7, 98.2), 0.0), (DVec2::new(60.2, 50.0), 3.0)];
     let whole = solve_from(f(), &starts, &Stop::Never);
-    let labels = whole.labels();
+    let labels = whole.allocation();
     assert!(labels.iter().all(Option::is_some));
     assert_eq!((labels[3], labels[99 * cols], labels[50 * cols + 60]), (Some(0), Some(0), Some(1)));
     let goal = DVec2::new(cols as f64 + 4.4, -3.2);
