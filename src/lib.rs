@@ -91,6 +91,7 @@ pub mod terrain;
 pub use control::{CancelToken, Control, Progress};
 pub use eikonal::{Accuracy, DistanceMap, Solver, StartRegion, Stop};
 pub use error::{Error, Result};
+pub use geo_types;
 pub use glam;
 pub use grid::{GridFrame, Ground};
 pub use linalg::Sym2;

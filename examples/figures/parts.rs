@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use ridgeway::eikonal::TensorField;
+use ridgeway::geo_types::Line;
 use ridgeway::metric::{Difference, Metric};
 use ridgeway::region::{
     Neighbours, SegmentOptions, Segmentation, Signature, gaussian_ranks, signatures,
@@ -42,10 +43,9 @@ impl Cut {
 /// Which of some lines of nodes around, given as shares of all rows, each node is nearest to under the difference metric.
 pub(crate) fn nearest_rings(surface: &NurbsGrid, rows: &[f64]) -> Result<Vec<Option<u32>>> {
     let control = Control::default();
-    let last = DVec2::X * surface.cols() as f64;
     let ring = |&row: &f64| {
-        let from = DVec2::new(0.0, row * (surface.rows() - 1) as f64);
-        StartRegion { lines: vec![vec![from, from + last]], ..StartRegion::default() }
+        let row = row * (surface.rows() - 1) as f64;
+        StartRegion::from(Line::new((0.0, row), (surface.cols() as f64, row)))
     };
     let starts: Vec<_> = rows.iter().map(ring).collect();
     let metric = Difference::default().on(surface, &Modifiers::default(), &control)?;

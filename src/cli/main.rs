@@ -2,7 +2,6 @@
 
 mod args;
 mod commands;
-mod cover;
 mod output;
 mod places;
 mod plan;

@@ -4,8 +4,10 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use geojson::{GeoJson, Geometry, GeometryValue, Position};
+use geo_types::Geometry;
+use geojson::GeoJson;
 use glam::DVec2;
+use ridgeway::grid::Shapes;
 use ridgeway::terrain::Georeference;
 use ridgeway::{Error, GridFrame, Result, StartRegion, Terrain};
 
@@ -202,20 +204,20 @@ pub(crate) fn regions(
     let (mut regions, mut spots) = (Vec::new(), Vec::new());
     for place in places {
         let first = spots.len();
-        let mut region = StartRegion::default();
+        let mut shapes = Shapes::default();
         match place {
             Place::At(notation, at) => {
                 spots.push(Spot::new(option, place.to_string(), *notation, *at, terrain)?);
             }
             Place::File(path) => {
-                region = read_shapes(path, terrain.georeference())?;
-                for &grid in &region.points {
+                shapes = read_shapes(path, terrain.georeference())?;
+                for &grid in &shapes.points {
                     spots.push(file_spot(option, path, grid, terrain)?);
                 }
             }
         }
-        region.points = spots[first..].iter().map(|spot| spot.at).collect();
-        regions.push(region);
+        shapes.points = spots[first..].iter().map(|spot| spot.at).collect();
+        regions.push(shapes.into());
     }
     Ok((regions, spots))
 }
@@ -230,7 +232,8 @@ pub(crate) fn points(
     terrain: &Terrain,
 ) -> Result<Vec<Spot>> {
     let (regions, spots) = regions(option, places, terrain)?;
-    if regions.iter().all(|region| region.lines.is_empty() && region.areas.is_empty()) {
+    let only_points = |shapes: &Shapes| shapes.lines.is_empty() && shapes.polygons.is_empty();
+    if regions.iter().all(|region| only_points(&region.shapes)) {
         return Ok(spots);
     }
     Err(Error::usage(format!("{option} takes points; its file also holds lines or areas")))
@@ -246,60 +249,35 @@ fn file_spot(option: &'static str, path: &Path, grid: DVec2, terrain: &Terrain) 
 ///
 /// # Errors
 /// The file cannot be read, is not GeoJSON, holds no geometry; the DEM has no CRS.
-pub(crate) fn read_shapes(path: &Path, georeference: &Georeference) -> Result<StartRegion> {
+pub(crate) fn read_shapes(path: &Path, georeference: &Georeference) -> Result<Shapes> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
     if text.is_empty() {
         return Err(Error::format(path, "the file is empty"));
     }
-    let json: GeoJson =
-        text.parse().map_err(|error| Error::format(path, format!("is not GeoJSON: {error}")))?;
-    let geometries: Vec<Geometry> = match json {
-        GeoJson::Geometry(geometry) => vec![geometry],
-        GeoJson::Feature(feature) => feature.geometry.into_iter().collect(),
-        GeoJson::FeatureCollection(all) => {
-            all.features.into_iter().filter_map(|f| f.geometry).collect()
-        }
-    };
-    let mut shapes = StartRegion::default();
-    for geometry in &geometries {
-        gather(&geometry.value, georeference, &mut shapes)
-            .map_err(|error| Error::format(path, error.to_string()))?;
-    }
-    if shapes == StartRegion::default() {
+    let shapes = lonlat_shapes(&text)
+        .map_err(|error| Error::format(path, format!("is not GeoJSON: {error}")))?
+        .try_map(|lonlat| georeference.from_lonlat(lonlat))
+        .map_err(|error| Error::format(path, error.to_string()))?;
+    if shapes.is_empty() {
         return Err(Error::format(path, "holds no points, lines or areas"));
     }
     Ok(shapes)
 }
 
-fn gather(
-    geometry: &GeometryValue,
-    georeference: &Georeference,
-    shapes: &mut StartRegion,
-) -> Result<()> {
-    let point = |at: &Position| match *at.as_slice() {
-        [lon, lat, ..] => georeference.from_lonlat(DVec2::new(lon, lat)),
-        _ => Err(Error::usage("a position needs two numbers")),
+/// All geometry of a GeoJSON text, in longitude and latitude.
+fn lonlat_shapes(text: &str) -> std::result::Result<Shapes, geojson::Error> {
+    let geometries: Vec<_> = match text.parse()? {
+        GeoJson::Geometry(geometry) => vec![geometry],
+        GeoJson::Feature(feature) => feature.geometry.into_iter().collect(),
+        GeoJson::FeatureCollection(all) => {
+            all.features.into_iter().filter_map(|feature| feature.geometry).collect()
+        }
     };
-    let line = |points: &Vec<Position>| points.iter().map(point).collect::<Result<Vec<_>>>();
-    let area = |rings: &Vec<Vec<Position>>| rings.iter().map(line).collect::<Result<Vec<_>>>();
-    match geometry {
-        GeometryValue::Point { coordinates } => shapes.points.push(point(coordinates)?),
-        GeometryValue::MultiPoint { coordinates } => shapes.points.extend(line(coordinates)?),
-        GeometryValue::LineString { coordinates } => shapes.lines.push(line(coordinates)?),
-        GeometryValue::MultiLineString { coordinates } => shapes.lines.extend(area(coordinates)?),
-        GeometryValue::Polygon { coordinates } => shapes.areas.push(area(coordinates)?),
-        GeometryValue::MultiPolygon { coordinates } => {
-            for rings in coordinates {
-                shapes.areas.push(area(rings)?);
-            }
-        }
-        GeometryValue::GeometryCollection { geometries } => {
-            for geometry in geometries {
-                gather(&geometry.value, georeference, shapes)?;
-            }
-        }
+    let mut shapes = Shapes::default();
+    for geometry in geometries {
+        shapes.add(Geometry::try_from(geometry)?);
     }
-    Ok(())
+    Ok(shapes)
 }
 
 /// The cell of a point of the grid's hull.
@@ -331,6 +309,34 @@ mod tests {
         }
         for text in ["", "3", "3,", "lonlat:a.geojson", "pixel:3", "nan,3", "valley.tif"] {
             assert!(text.parse::<Place>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn geojson_gives_all_its_geometry() {
+        let point = r#"{"type":"Point","coordinates":[1,2,300]}"#;
+        let line = r#"{"type":"LineString","coordinates":[[1,2],[3,4]]}"#;
+        let polygon = r#"{"type":"Polygon","coordinates":[[[0,0],[1,0],[0,1],[0,0]]]}"#;
+        let feature = |geometry: &str| {
+            format!(r#"{{"type":"Feature","properties":{{}},"geometry":{geometry}}}"#)
+        };
+        let all = format!(r#"{{"type":"GeometryCollection","geometries":[{point},{polygon}]}}"#);
+        let features = [feature(line), feature(&all), feature("null")].join(",");
+        let text = format!(r#"{{"type":"FeatureCollection","features":[{features}]}}"#);
+        let shapes = lonlat_shapes(&text).unwrap();
+        assert_eq!(shapes.points, [DVec2::new(1.0, 2.0)]);
+        assert_eq!((shapes.lines.len(), shapes.polygons.len()), (1, 1));
+    }
+
+    #[test]
+    fn positions_of_one_number_are_refused() {
+        for coordinates in ["[1]", "[]"] {
+            let kinds = [("Point", 0), ("LineString", 1), ("Polygon", 2), ("MultiPolygon", 3)];
+            for (kind, depth) in kinds {
+                let nested = "[".repeat(depth) + coordinates + &"]".repeat(depth);
+                let text = format!(r#"{{"type":"{kind}","coordinates":{nested}}}"#);
+                assert!(lonlat_shapes(&text).is_err(), "{text}");
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use ridgeway::grid::rasterise;
 use ridgeway::metric::NamedMetric;
 use ridgeway::terrain::{Georeference, read_bands};
 use ridgeway::{
@@ -12,7 +13,6 @@ use ridgeway::{
 use serde_json::{Value, json};
 
 use crate::args::{FitArgs, GroundArgs, RunArgs, TENSOR};
-use crate::cover::cover;
 use crate::places::{self, Place, Spot, cell};
 use crate::report::{self, digits};
 
@@ -238,15 +238,16 @@ pub(crate) fn describe_fit(args: &FitArgs, surface: &HeightSurface) -> String {
 
 /// The cells of `--barrier`, if there are any.
 fn barrier(args: &GroundArgs, terrain: &Terrain) -> Result<Option<Arc<[bool]>>> {
-    let mut shapes = StartRegion::default();
+    let mut cells: Option<Vec<bool>> = None;
     for path in &args.metric.barrier {
-        let more = places::read_shapes(path, terrain.georeference())?;
-        shapes.points.extend(more.points);
-        shapes.lines.extend(more.lines);
-        shapes.areas.extend(more.areas);
+        let shapes = places::read_shapes(path, terrain.georeference())?;
+        let touched = rasterise(terrain.frame(), &shapes);
+        match &mut cells {
+            Some(cells) => cells.iter_mut().zip(touched).for_each(|(cell, more)| *cell |= more),
+            None => cells = Some(touched),
+        }
     }
-    let any = !args.metric.barrier.is_empty();
-    Ok(any.then(|| cover(terrain.frame(), &shapes).into()))
+    Ok(cells.map(Arc::from))
 }
 
 /// Checks that points lie on, and that every start of lines and areas touches, open ground.
@@ -266,8 +267,8 @@ fn check_open<'s>(
         };
         spot.check(terrain.georeference(), open, why)?;
     }
-    for region in regions.iter().filter(|region| region.points.is_empty()) {
-        let touched = cover(terrain.frame(), region);
+    for region in regions.iter().filter(|region| region.shapes.points.is_empty()) {
+        let touched = rasterise(terrain.frame(), &region.shapes);
         let cols = terrain.frame().cols();
         let any = touched.iter().enumerate().any(|(i, &t)| t && open(i % cols, i / cols));
         if !any {

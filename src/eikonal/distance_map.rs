@@ -8,7 +8,7 @@ use super::predecessor;
 use super::schedule::rounds::Statistics;
 use super::schedule::values::Values;
 use super::second_order::Correction;
-use super::source::StartRegion;
+use super::start::StartRegion;
 use super::stencil::UNREACHED;
 use super::tensor_field::{TensorField, TensorTile};
 use super::tile::Limits;

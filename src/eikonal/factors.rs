@@ -5,7 +5,8 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::source::{POINT_RADIUS, StartRegion};
+use super::source::POINT_RADIUS;
+use super::start::StartRegion;
 use super::stencil::factoring::{ALIKE, Factor, are_roots_within};
 use super::tensor_field::{TensorField, TensorTile};
 use crate::grid::tiling::{SIDE, Tiling};
@@ -41,7 +42,7 @@ impl Factors {
     pub(crate) fn within(field: &TensorField, starts: &[StartRegion], distance: f64) -> Self {
         let of_start = |start: &StartRegion| {
             let travelled = start.value * field.root_scale();
-            let corners = start.corners();
+            let corners = start.shapes.corners();
             corners
                 .filter_map(|(at, sides)| {
                     Some(Factor::new(at, field.metric_at(at)?, sides, travelled))

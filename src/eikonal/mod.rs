@@ -20,6 +20,7 @@ mod schedule;
 mod second_order;
 mod solver;
 mod source;
+mod start;
 mod stencil;
 mod tensor_field;
 mod tile;
@@ -29,8 +30,8 @@ pub use self::distance_map::DistanceMap;
 pub use self::schedule::rounds::Statistics;
 pub use self::schedule::stop::Stop;
 pub use self::solver::{Accuracy, Solver};
-pub use self::source::StartRegion;
 pub(crate) use self::source::sees;
+pub use self::start::StartRegion;
 pub use self::tensor_field::TensorField;
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::factors::Factors;
 use super::predecessor::best_foot;
 use super::schedule::values::Values;
-use super::source::StartRegion;
+use super::start::StartRegion;
 use super::stencil::ring::RING;
 use super::tensor_field::TensorField;
 use super::tile::Limits;

@@ -1,38 +1,21 @@
-//! Start regions: points between nodes, lines, areas.
+//! Start values: at the nodes on and near points, lines and areas, and the way back to these.
 
 use std::array::from_fn;
 
 use glam::DVec2;
 
+use super::start::StartRegion;
 use super::stencil::UNREACHED;
 use super::stencil::factoring::Factor;
 use super::stencil::segment::segment;
 use super::tensor_field::TensorField;
 use crate::error::{Error, Result};
 use crate::grid::tiling::{AREA, Tiling};
+use crate::grid::{in_sight, nodes_inside};
 use crate::linalg::Sym2;
 
 /// Values that a tile's nodes have from the start, infinite where none.
 pub(super) type Seeds = [f32; AREA];
-
-/// Where ways begin, in grid coordinates (column, row).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct StartRegion {
-    /// Single points, on nodes or between them.
-    pub points: Vec<DVec2>,
-    /// Polylines.
-    pub lines: Vec<Vec<DVec2>>,
-    /// Areas: closed rings, inside by the even-odd rule.
-    pub areas: Vec<Vec<Vec<DVec2>>>,
-    /// Distance already travelled there, in the unit of the metric: 0 or more. Default 0.
-    pub value: f64,
-}
-
-impl From<DVec2> for StartRegion {
-    fn from(point: DVec2) -> Self {
-        Self { points: vec![point], ..Self::default() }
-    }
-}
 
 /// Around a point or a corner, nodes this near get the length of the geodesic to it, of second order, see [`geodesic`]. A ball of a
 /// fixed size in cells is safe on any metric.
@@ -124,69 +107,11 @@ pub(super) fn foot_on_any(
 }
 
 impl StartRegion {
-    /// The same region with `value` travelled already.
-    #[must_use]
-    pub fn with_value(self, value: f64) -> Self {
-        Self { value, ..self }
-    }
-
-    fn check(&self, tiling: &Tiling) -> Result<()> {
-        /// So many times around the grid a region may reach in a periodic direction.
-        const MOST_TURNS: f64 = 64.0;
-        if !(self.value.is_finite() && self.value >= 0.0) {
-            return Err(Error::argument("the value of a start region", self.value, "0 or more"));
-        }
-        let far = MOST_TURNS * DVec2::new(tiling.cols as f64, tiling.rows as f64);
-        let bad = |at: &DVec2| {
-            let [across, down] = tiling.periodic;
-            !at.is_finite() || (across && at.x.abs() > far.x) || (down && at.y.abs() > far.y)
-        };
-        match self.vertices().find(bad) {
-            Some(at) => Err(Error::argument(
-                "a point of the start",
-                at,
-                format!("finite, and at most {MOST_TURNS} turns around a grid that is periodic"),
-            )),
-            None => Ok(()),
-        }
-    }
-
-    fn vertices(&self) -> impl Iterator<Item = DVec2> + '_ {
-        let points = self.points.iter().chain(self.lines.iter().flatten());
-        points.chain(self.areas.iter().flatten().flatten()).copied()
-    }
-
-    /// Whether there is nothing in it.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty() && self.lines.is_empty() && self.areas.is_empty()
-    }
-
-    /// Whether grid coordinates lie in one of the areas.
-    #[must_use]
-    pub fn covers(&self, at: DVec2) -> bool {
-        self.areas.iter().any(|rings| {
-            let crossings =
-                rings.iter().flat_map(|ring| closed_segments(ring)).filter(|&(a, b)| {
-                    (a.y > at.y) != (b.y > at.y)
-                        && at.x < a.x + (at.y - a.y) / (b.y - a.y) * (b.x - a.x)
-                });
-            crossings.count() % 2 == 1
-        })
-    }
-
-    /// Calls `visit(column, row)` for the nodes of a grid of `cols × rows` that lie in an area, by the even-odd rule; once for each
-    /// area. The cost is that of the rows that the segments cross, and of the nodes.
-    pub fn nodes_inside(&self, cols: usize, rows: usize, mut visit: impl FnMut(usize, usize)) {
-        let tiling = Tiling::new(cols, rows);
-        self.areas.iter().for_each(|rings| inside(&tiling, rings, &mut visit));
-    }
-
     /// Start values in stored units: calls `set(col, row, value)` for nodes on and near the region.
     fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
         let travelled = self.value * field.root_scale();
         let mut set = |col, row, length| set(col, row, travelled + length);
-        for (at, sides) in self.corners() {
+        for (at, sides) in self.shapes.corners() {
             let Some(metric) = field.metric_at(at) else { continue };
             let factor = Factor::new(at, metric, sides, travelled);
             let is_clear = is_clear(field, at, POINT_RADIUS);
@@ -200,7 +125,7 @@ impl StartRegion {
                 }
             });
         }
-        for (a, b) in self.segments() {
+        for [a, b] in self.shapes.segments() {
             near(field, a, b, LINE_RADIUS, |col, row, node, nearest| {
                 if let Some(metric) = field.metric(col, row) {
                     let (_, theta) = segment(0.0, a - node, 0.0, b - node, metric);
@@ -211,8 +136,8 @@ impl StartRegion {
                 }
             });
         }
-        for rings in &self.areas {
-            inside(&field.tiling, rings, |col, row| {
+        for polygon in &self.shapes.polygons {
+            nodes_inside(polygon, &field.tiling, |col, row| {
                 if field.is_open(col, row) {
                     set(col, row, 0.0);
                 }
@@ -220,27 +145,13 @@ impl StartRegion {
         }
     }
 
-    /// The points that geodesics fan out from, each with the directions of the sides that end there.
-    pub(super) fn corners(&self) -> impl Iterator<Item = (DVec2, [DVec2; 2])> + '_ {
-        let points = self.points.iter().map(|&point| (point, [DVec2::ZERO; 2]));
-        let lines = self.lines.iter().flat_map(|line| corners(line, line.first() == line.last()));
-        let rings = self.areas.iter().flatten().flat_map(|ring| corners(ring, true));
-        points.chain(lines).chain(rings)
-    }
-
-    /// Segments of the lines and of the borders of the areas.
-    fn segments(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
-        let lines =
-            self.lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1])));
-        lines.chain(self.areas.iter().flatten().flat_map(|ring| closed_segments(ring)))
-    }
-
     /// The point of the region that a traveller at `at`, nearer than `radius` cells, can go to in a straight
     /// line, and the region's value with the length of that (stored units); the shortest of them. In periodic directions
     /// that of the nearest image of the region.
     fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
         let far = DVec2::INFINITY;
-        let (least, most) = self.vertices().fold((far, -far), |(a, b), p| (a.min(p), b.max(p)));
+        let (least, most) =
+            self.shapes.vertices().fold((far, -far), |(a, b), p| (a.min(p), b.max(p)));
         let turns = field.tiling.images(at, least - radius, most + radius);
         let feet = turns.filter_map(|turn| {
             let (foot, length) = self.own_foot(field, at + turn, radius)?;
@@ -251,45 +162,22 @@ impl StartRegion {
 
     fn own_foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
         let travelled = self.value * field.root_scale();
-        if self.covers(at) {
+        if self.shapes.contains(at) {
             return Some((at, travelled));
         }
         let metric = field.metric_at(at)?;
-        let feet = self.segments().map(|(a, b)| {
+        let feet = self.shapes.segments().map(|[a, b]| {
             let (_, theta) = segment(0.0, a - at, 0.0, b - at, metric);
             a.lerp(b, theta)
         });
-        self.points
-            .iter()
+        let points = self.shapes.points.iter();
+        points
             .copied()
             .chain(feet)
             .filter(|foot| foot.distance(at) <= radius)
             .filter_map(|foot| Some((foot, travelled + straight(field, at, foot)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
-}
-
-/// The corners of a line and its ends, or of a ring, each with the directions of its two sides, zero for none. A point
-/// that is given twice in a row, as to close a ring, is one.
-fn corners(line: &[DVec2], closed: bool) -> Vec<(DVec2, [DVec2; 2])> {
-    let mut line = line.to_vec();
-    line.dedup();
-    if closed && line.len() > 1 && line.first() == line.last() {
-        line.pop();
-    }
-    let count = line.len();
-    let side = |from: usize, to: Option<usize>| {
-        to.filter(|&to| to < count).map_or(DVec2::ZERO, |to| line[to] - line[from])
-    };
-    let corner = |i: usize| match closed {
-        true => [side(i, Some((i + count - 1) % count)), side(i, Some((i + 1) % count))],
-        false => [side(i, i.checked_sub(1)), side(i, Some(i + 1))],
-    };
-    (0..count).map(|i| (line[i], corner(i))).collect()
-}
-
-fn closed_segments(ring: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
-    (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()]))
 }
 
 /// Open nodes within `radius` cells of the segment, each with its place beside it and its nearest point on it.
@@ -309,34 +197,6 @@ fn near(
             let nearest = a.lerp(b, theta);
             if nearest.distance(node) <= radius && field.is_open(c, r) {
                 visit(c, r, node, nearest);
-            }
-        }
-    }
-}
-
-/// Nodes inside the rings by the even-odd rule, row by row between the crossings of their segments.
-fn inside(tiling: &Tiling, rings: &[Vec<DVec2>], mut visit: impl FnMut(usize, usize)) {
-    let heights = rings.iter().flatten().map(|at| at.y);
-    let (north, south) =
-        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)));
-    let rows = tiling.span(1, north, south);
-    let mut crossings = vec![Vec::new(); rows.len()];
-    for (a, b) in rings.iter().flat_map(|ring| closed_segments(ring)) {
-        for row in tiling.span(1, a.y.min(b.y), a.y.max(b.y)) {
-            let y = row as f64;
-            let x = a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x);
-            if (a.y > y) != (b.y > y) && x.is_finite() {
-                crossings[(row - rows.start) as usize].push(x);
-            }
-        }
-    }
-    for (row, mut crossings) in rows.zip(crossings) {
-        crossings.sort_unstable_by(f64::total_cmp);
-        for ends in crossings.chunks_exact(2) {
-            for col in tiling.span(0, ends[0], ends[1]) {
-                if let Some((c, r)) = tiling.node(col, row) {
-                    visit(c, r);
-                }
             }
         }
     }
@@ -434,37 +294,7 @@ fn is_clear(field: &TensorField, at: DVec2, radius: f64) -> bool {
     })
 }
 
-/// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones.
+/// Whether no wall is between two points nearby, see [`in_sight`].
 pub(crate) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
-    /// Samples per cell of length: a wall in a cell is crossed by more than one of them or hardly touched.
-    const DENSITY: f64 = 8.0;
-    let steps = (a.distance(b) * DENSITY).ceil().max(1.0);
-    (0..=steps as usize).all(|i| {
-        let p = a.lerp(b, i as f64 / steps);
-        let (col, row) = (p.x.floor() as isize, p.y.floor() as isize);
-        let open = |i: isize, j: isize| {
-            field.tiling.node(col + i, row + j).is_none_or(|(c, r)| field.is_open(c, r))
-        };
-        let corners = [open(0, 0), open(1, 0), open(0, 1), open(1, 1)];
-        corners == [true; 4] || on_free_side(corners, p - p.floor(), a, b, p.floor())
-    })
-}
-
-/// In a cell with closed corners: whether the way stays on the side of its own end's corner.
-fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) -> bool {
-    // The nearest corner, or one of the nearest, must be open, ...
-    let distance = |i: usize| at.distance_squared(DVec2::new((i % 2) as f64, (i / 2) as f64));
-    let nearest = (0..4).map(distance).fold(f64::INFINITY, f64::min);
-    if !(0..4).any(|i| corners[i] && distance(i) <= nearest + 1e-9) {
-        return false;
-    }
-    // ... and where a wall runs along a diagonal, the whole way must lie on one side of it.
-    let side = |p: DVec2, rising: bool| {
-        let q = p - cell;
-        if rising { q.x - q.y } else { q.x + q.y - 1.0 }
-    };
-    let crosses = |rising: bool| side(a, rising) * side(b, rising) < 0.0;
-    let falling_wall = !corners[1] && !corners[2];
-    let rising_wall = !corners[0] && !corners[3];
-    !(falling_wall && crosses(false) || rising_wall && crosses(true))
+    in_sight(a, b, |col, row| field.tiling.node(col, row).is_none_or(|(c, r)| field.is_open(c, r)))
 }

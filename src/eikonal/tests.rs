@@ -8,6 +8,7 @@ mod periodic;
 use std::f64::consts::TAU;
 use std::sync::Mutex;
 
+use geo_types::{LineString, MultiPoint, Polygon, Rect};
 use glam::DVec2;
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 use super::*;
 use crate::control::Control;
 use crate::error::Error;
+use crate::grid::Shapes;
 use crate::linalg::Sym2;
 
 const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
@@ -30,6 +32,10 @@ fn field(
     tensor: impl Fn(usize, usize) -> Option<Sym2> + Sync,
 ) -> TensorField {
     TensorField::from_fn(cols, rows, tensor, &Control::default()).unwrap()
+}
+
+fn line(points: impl IntoIterator<Item = DVec2>) -> LineString<f64> {
+    points.into_iter().map(|at| (at.x, at.y)).collect()
 }
 
 fn solve(field: TensorField, start: DVec2) -> DistanceMap {
@@ -160,9 +166,8 @@ fn lines_and_areas_are_start_regions() {
     let m = rotated(4.0, 0.3).inverse();
     // Distance to a straight line: |n·x| / √(nᵀ D n).
     let (a, b) = (DVec2::new(-200.0, 10.2), DVec2::new(300.0, 35.7));
-    let line = StartRegion { lines: vec![vec![a, b]], ..StartRegion::default() };
     let map = Solver::default()
-        .solve_field(f.clone(), &[line], &Stop::Never, &Control::default())
+        .solve_field(f.clone(), &[line([a, b]).into()], &Stop::Never, &Control::default())
         .unwrap();
     let normal = (b - a).perp();
     let exact = |c, r| {
@@ -173,9 +178,7 @@ fn lines_and_areas_are_start_regions() {
     let (_, mean) = errors(&map, exact);
     assert!(mean < 1e-4, "plane waves are exact up to rounding and tolerance: {mean}");
 
-    let square = vec![[20.0, 20.0], [40.0, 20.0], [40.0, 40.0], [20.0, 40.0]];
-    let ring: Vec<DVec2> = square.into_iter().map(DVec2::from).collect();
-    let area = StartRegion { areas: vec![vec![ring]], ..StartRegion::default() };
+    let area = StartRegion::from(Rect::new((20.0, 20.0), (40.0, 40.0)));
     let map = Solver::default().solve_field(f, &[area], &Stop::Never, &Control::default()).unwrap();
     assert_eq!(map.at_node(30, 30), 0.0);
     assert!((map.at_node(30, 50) - 10.0 / m.inverse().norm(DVec2::Y)).abs() < 1e-3);
@@ -186,8 +189,8 @@ fn an_outline_of_many_corners_is_as_good_a_start_as_a_circle() {
     let (n, centre, radius) = (201, DVec2::splat(100.0), 30.0);
     for corners in [500, 20_000] {
         let angle = |i: usize| TAU * i as f64 / corners as f64;
-        let ring = (0..corners).map(|i| centre + radius * DVec2::from_angle(angle(i))).collect();
-        let start = [StartRegion { areas: vec![vec![ring]], ..StartRegion::default() }];
+        let ring = line((0..corners).map(|i| centre + radius * DVec2::from_angle(angle(i))));
+        let start = [Polygon::new(ring, vec![]).into()];
         let (f, control) = (field(n, n, |_, _| Some(IDENTITY)), Control::default());
         let map = Solver::default().solve_field(f, &start, &Stop::Never, &control).unwrap();
         let exact = |c: usize, r: usize| DVec2::new(c as f64, r as f64).distance(centre) - radius;
@@ -198,20 +201,18 @@ fn an_outline_of_many_corners_is_as_good_a_start_as_a_circle() {
 
 #[test]
 fn a_ring_given_closed_is_the_same_start() {
-    let open: Vec<DVec2> =
-        [[30.0, 30.0], [50.0, 34.0], [44.0, 52.0]].into_iter().map(DVec2::from).collect();
-    let closed: Vec<DVec2> = open.iter().chain(&open[..1]).copied().collect();
-    let solve = |lines: Vec<Vec<DVec2>>, areas: Vec<Vec<Vec<DVec2>>>| {
+    let open = [[30.0, 30.0], [50.0, 34.0], [44.0, 52.0]].map(DVec2::from);
+    let closed = || line(open.into_iter().chain([open[0]]));
+    let solve = |start: StartRegion| {
         let f = field(91, 91, |_, _| Some(rotated(4.0, 0.3)));
-        let start = [StartRegion { lines, areas, ..StartRegion::default() }];
         let solver = Solver { tolerance: 0.0, ..Solver::default() };
-        let map = solver.solve_field(f, &start, &Stop::Never, &Control::default());
+        let map = solver.solve_field(f, &[start], &Stop::Never, &Control::default());
         map.unwrap().to_row_major()
     };
-    let area = solve(vec![], vec![vec![open]]);
-    assert_eq!(area, solve(vec![], vec![vec![closed.clone()]]));
+    let area = solve(Polygon::new(line(open), vec![]).into());
+    assert_eq!(area, solve(Polygon::new(closed(), vec![]).into()));
     // Outside, a closed line is the border of its area.
-    for (i, (line, area)) in solve(vec![closed], vec![]).into_iter().zip(area).enumerate() {
+    for (i, (line, area)) in solve(closed().into()).into_iter().zip(area).enumerate() {
         assert!(area == 0.0 || (line - area).abs() < 1e-6 * area, "{i}: {line} {area}");
     }
 }
@@ -466,9 +467,9 @@ fn the_nearest_start_wins_its_value_included() {
 fn one_list_of_starts_is_one_region_of_all() {
     let f = || field(90, 70, |c, r| Some(rotated(1.0 + (c % 30) as f64, 0.05 * r as f64)));
     let points = [DVec2::new(10.2, 60.0), DVec2::new(70.0, 20.9), DVec2::new(44.0, 33.3)];
-    let one = StartRegion { points: points.to_vec(), ..StartRegion::default() };
+    let one: MultiPoint<f64> = points.iter().map(|at| (at.x, at.y)).collect();
     let control = Control::default();
-    let one = Solver::default().solve_field(f(), &[one], &Stop::Never, &control).unwrap();
+    let one = Solver::default().solve_field(f(), &[one.into()], &Stop::Never, &control).unwrap();
     let three = solve_from(f(), &points.map(|at| (at, 0.0)), &Stop::Never);
     assert_eq!(one.values, three.values);
     assert!(one.allocation().iter().all(|&label| label == Some(0)));
@@ -566,11 +567,10 @@ fn numbers_out_of_range_are_refused() {
         Solver::default().solve_field(rough(20, 20), &[good, start], stop, &Control::default())
     };
     let at = |at: DVec2| StartRegion::from(at);
-    let line = |points: Vec<DVec2>| StartRegion { lines: vec![points], ..StartRegion::default() };
     for value in [f64::NAN, f64::INFINITY, -1.0] {
         assert!(run(at(OPEN).with_value(value), &Stop::Never).is_err());
     }
-    for bad in [at(DVec2::NAN), at(DVec2::INFINITY), line(vec![OPEN, DVec2::NAN])] {
+    for bad in [at(DVec2::NAN), at(DVec2::INFINITY), line([OPEN, DVec2::NAN]).into()] {
         assert!(run(bad, &Stop::Never).is_err());
     }
     for d in [f64::NAN, -1.0] {
@@ -607,12 +607,20 @@ fn wild_start(cols: usize, rows: usize) -> impl Strategy<Value = StartRegion> {
         prop_oneof![3 => any_number(-3.0..last + 3.0), 1 => Just(last), 1 => Just(0.0)]
     };
     let point = (coordinate(cols), coordinate(rows)).prop_map(|(x, y)| DVec2::new(x, y));
-    let line = proptest::collection::vec(point, 0..4);
-    (proptest::collection::vec(line, 3), any_number(0.0..9.0), any::<bool>()).prop_map(
+    let points = proptest::collection::vec(point, 0..4);
+    (proptest::collection::vec(points, 3), any_number(0.0..9.0), any::<bool>()).prop_map(
         |(mut lines, value, point)| {
             let points = lines.pop().unwrap_or_default();
-            let areas = if point { vec![] } else { vec![lines.split_off(1)] };
-            StartRegion { points, lines, areas, value: if point { 0.0 } else { value } }
+            let mut shapes = Shapes { points, ..Shapes::default() };
+            let mut lines = lines.drain(..).map(line);
+            shapes.lines.extend(lines.next());
+            if point {
+                shapes.lines.extend(lines);
+                return shapes.into();
+            }
+            let exterior = lines.next().unwrap_or_else(LineString::empty);
+            shapes.polygons.push(Polygon::new(exterior, lines.collect()));
+            StartRegion::from(shapes).with_value(value)
         },
     )
 }

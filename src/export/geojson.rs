@@ -1,6 +1,7 @@
 //! Routes, isolines and regions as GeoJSON (RFC 7946): longitude and latitude on WGS84, heights in metres.
 
 use ::geojson::{Feature, FeatureCollection, GeometryValue, JsonObject, Position};
+use geo_types::{LineString, MultiPolygon};
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 use serde_json::Value;
@@ -9,7 +10,6 @@ use super::antimeridian::{cut_at_antimeridian, unwrap_ring};
 use super::round;
 use crate::error::{Error, Result};
 use crate::grid::{GridFrame, Isoline};
-use crate::region::Polygon;
 use crate::route::Route;
 use crate::terrain::Crs;
 
@@ -51,7 +51,7 @@ pub fn isolines_geojson(
 /// # Errors
 /// As [`routes_geojson`]; [`Error::Argument`] if properties are not a JSON object.
 pub fn regions_geojson(
-    regions: &[(impl Serialize, Vec<Polygon>)],
+    regions: &[(impl Serialize, MultiPolygon<f64>)],
     frame: &GridFrame,
     crs: &Crs,
     provenance: &impl Serialize,
@@ -126,14 +126,18 @@ fn isoline_feature(isoline: &Isoline, frame: &GridFrame, unit: &str) -> Shape {
     Shape { geometry: Geometry::Lines(isoline.lines.iter().map(place).collect()), properties }
 }
 
-fn region_feature(properties: JsonObject, polygons: &[Polygon], frame: &GridFrame) -> Shape {
-    let place =
-        |ring: &Vec<DVec2>| ring.iter().map(|&p| frame.to_map(p).extend(f64::NAN)).collect();
-    let rings = |polygon: &Polygon| {
-        std::iter::once(&polygon.exterior).chain(&polygon.holes).map(place).collect()
+fn region_feature(
+    properties: JsonObject,
+    polygons: &MultiPolygon<f64>,
+    frame: &GridFrame,
+) -> Shape {
+    let place = |ring: &LineString<f64>| {
+        ring.coords().map(|at| frame.to_map(DVec2::new(at.x, at.y)).extend(f64::NAN)).collect()
     };
-    let geometry = Geometry::Areas(polygons.iter().map(rings).collect());
-    Shape { geometry, properties }
+    let areas = polygons.iter().map(|polygon| {
+        std::iter::once(polygon.exterior()).chain(polygon.interiors()).map(place).collect()
+    });
+    Shape { geometry: Geometry::Areas(areas.collect()), properties }
 }
 
 fn collection(
@@ -208,6 +212,7 @@ fn position(p: DVec3) -> Position {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use geo_types::Polygon;
     use serde_json::json;
 
     use super::*;
@@ -293,18 +298,18 @@ pub(super) mod tests {
     #[test]
     fn regions_are_polygons_with_holes() {
         let square = |from: f64, to: f64| {
-            [(from, to), (to, to), (to, from), (from, from), (from, to)].map(DVec2::from).to_vec()
+            LineString::from(vec![(from, to), (to, to), (to, from), (from, from)])
         };
         let mut hole = square(0.5, 1.5);
-        hole.reverse();
-        let polygon = Polygon { exterior: square(-0.5, 2.5), holes: vec![hole] };
+        hole.0.reverse();
+        let polygon = Polygon::new(square(-0.5, 2.5), vec![hole]);
         // The middle column lies on 180°.
         let frame =
             GridFrame::new(3, 3, DVec2::new(179.0, 1.0), DVec2::ONE, Ground::WGS84).unwrap();
         let mut properties = JsonObject::new();
         properties.insert("region".into(), 7.into());
         let wrapped = |p: DVec2| Ok(DVec2::new(p.x - 360.0 * (p.x / 360.0).round(), p.y));
-        let features = vec![region_feature(properties, &[polygon], &frame)];
+        let features = vec![region_feature(properties, &polygon.into(), &frame)];
         let text = collection(features, wrapped, &Value::Null).unwrap();
         let json: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(json["features"][0]["properties"]["region"], 7);

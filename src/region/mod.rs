@@ -18,7 +18,7 @@ mod statistics;
 
 pub use self::clusters::{cluster, gaussian_ranks};
 pub use self::matching::{Match, matches, matches_within};
-pub use self::outline::{Polygon, outlines};
+pub use self::outline::outlines;
 pub use self::segmentation::{Level, Region, SegmentOptions, Segmentation};
 pub use self::signature::{Neighbours, Signature, signatures};
 pub use self::statistics::{RegionStatistics, statistics};

@@ -5,24 +5,17 @@
 
 use std::collections::HashMap;
 
+use geo_types::{Coord, LineString, MultiPolygon, Polygon};
 use glam::DVec2;
 
 use super::Level;
+use crate::grid::contains;
 
-/// A polygon in grid coordinates. Rings are closed by their first point and touch each other or themselves in single points at most: the exterior is
-/// anticlockwise on a north-up map, holes are clockwise (RFC 7946).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Polygon {
-    /// The outer ring.
-    pub exterior: Vec<DVec2>,
-    /// What is cut out of it.
-    pub holes: Vec<Vec<DVec2>>,
-}
-
-/// The polygons of each region of a level on a grid of `cols` columns, in the order of [`Level::regions`]. Cells that touch at a
-/// corner only are in different polygons. Cost: about 100 ns per cell of border.
+/// The polygons of each region of a level on a grid of `cols` columns, in grid coordinates and the order of [`Level::regions`]. Cells that touch at
+/// a corner only are in different polygons. Rings touch each other or themselves in single points at most: exteriors are anticlockwise on a
+/// north-up map, holes clockwise (RFC 7946). Cost: about 100 ns per cell of border.
 #[must_use]
-pub fn outlines(level: &Level, cols: usize) -> Vec<Vec<Polygon>> {
+pub fn outlines(level: &Level, cols: usize) -> Vec<MultiPolygon<f64>> {
     let mut sides = vec![Vec::new(); level.regions.len()];
     let cells = Cells { labels: &level.labels, cols, rows: level.labels.len() / cols.max(1) };
     for (place, label) in level.labels.iter().enumerate() {
@@ -70,7 +63,7 @@ impl Cells<'_> {
 
     /// A ring of corners without those where it runs straight on and only one other label lies beside it, as grid
     /// coordinates.
-    fn corners(&self, ring: &[usize]) -> Vec<DVec2> {
+    fn corners(&self, ring: &[usize]) -> LineString<f64> {
         let count = ring.len();
         let kept = (0..count).filter(|&i| {
             let [before, here, after] =
@@ -80,10 +73,10 @@ impl Cells<'_> {
         });
         let place = |i: usize| {
             let (col, row) = (ring[i] % (self.cols + 1), ring[i] / (self.cols + 1));
-            DVec2::new(col as f64, row as f64) - 0.5
+            Coord { x: col as f64 - 0.5, y: row as f64 - 0.5 }
         };
-        let mut corners: Vec<DVec2> = kept.map(place).collect();
-        corners.extend(corners.first().copied());
+        let mut corners: LineString<f64> = kept.map(place).collect();
+        corners.close();
         corners
     }
 
@@ -130,32 +123,30 @@ fn rings(mut sides: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
 }
 
 /// Gives each hole to the smallest exterior around it.
-fn polygons(rings: impl Iterator<Item = Vec<DVec2>>) -> Vec<Polygon> {
-    let (exteriors, holes): (Vec<_>, Vec<_>) = rings.partition(|ring| area(ring) > 0.0);
-    let mut polygons: Vec<Polygon> =
-        exteriors.into_iter().map(|exterior| Polygon { exterior, holes: Vec::new() }).collect();
-    polygons.sort_by(|a, b| area(&a.exterior).total_cmp(&area(&b.exterior)));
+fn polygons(rings: impl Iterator<Item = LineString<f64>>) -> MultiPolygon<f64> {
+    let (mut exteriors, holes): (Vec<_>, Vec<_>) = rings.partition(|ring| area(ring) > 0.0);
+    exteriors.sort_by(|a, b| area(a).total_cmp(&area(b)));
+    let mut polygons: Vec<_> =
+        exteriors.into_iter().map(|exterior| Polygon::new(exterior, Vec::new())).collect();
     for hole in holes {
-        // The middle of the cell on the left of its first side.
-        let along = (hole[1] - hole[0]).normalize_or_zero();
-        let cell = hole[0] + 0.5 * (along - along.perp());
-        if let Some(owner) = polygons.iter_mut().find(|polygon| surrounds(&polygon.exterior, cell))
-        {
-            owner.holes.push(hole);
+        let cell = cell_beside(&hole);
+        if let Some(owner) = polygons.iter_mut().find(|polygon| contains(polygon, cell)) {
+            owner.interiors_push(hole);
         }
     }
-    polygons
+    polygons.into()
+}
+
+/// The middle of the cell on the left of the first side of a ring.
+fn cell_beside(ring: &LineString<f64>) -> DVec2 {
+    let [from, to] = [ring[0], ring[1]].map(|end| DVec2::new(end.x, end.y));
+    let along = (to - from).normalize_or_zero();
+    from + 0.5 * (along - along.perp())
 }
 
 /// Area in cells; positive if the ring is anticlockwise on a north-up map.
-fn area(ring: &[DVec2]) -> f64 {
-    -0.5 * ring.windows(2).map(|ends| ends[0].perp_dot(ends[1])).sum::<f64>()
-}
-
-/// Whether a point that is on no side lies inside the ring.
-fn surrounds(ring: &[DVec2], at: DVec2) -> bool {
-    let crossed = |ends: &&[DVec2]| ends[0].x > at.x && (ends[0].y > at.y) != (ends[1].y > at.y);
-    ring.windows(2).filter(crossed).count() % 2 == 1
+fn area(ring: &LineString<f64>) -> f64 {
+    -0.5 * ring.lines().map(|side| side.determinant()).sum::<f64>()
 }
 
 #[cfg(test)]
@@ -173,9 +164,12 @@ mod tests {
         (Level { labels, regions: vec![region; count as usize] }, cols)
     }
 
-    fn total_area(polygons: &[Polygon]) -> f64 {
-        let rings = polygons.iter().flat_map(|p| std::iter::once(&p.exterior).chain(&p.holes));
-        rings.map(|ring| area(ring)).sum()
+    fn rings(polygon: &Polygon<f64>) -> impl Iterator<Item = &LineString<f64>> {
+        polygon.interiors().iter().chain([polygon.exterior()])
+    }
+
+    fn total_area(polygons: &MultiPolygon<f64>) -> f64 {
+        polygons.iter().flat_map(rings).map(area).sum()
     }
 
     #[test]
@@ -197,16 +191,16 @@ mod tests {
                 let cells = level.labels.iter().filter(|l| **l == Some(label as u32)).count();
                 assert_eq!(total_area(polygons), cells as f64, "{picture}: {polygons:?}");
                 for polygon in polygons {
-                    assert!(area(&polygon.exterior) > 0.0);
-                    for ring in polygon.holes.iter().chain([&polygon.exterior]) {
-                        let mut corners: Vec<_> = ring[1..]
+                    assert!(area(polygon.exterior()) > 0.0);
+                    for ring in rings(polygon) {
+                        let mut corners: Vec<_> = ring.0[1..]
                             .iter()
                             .map(|p| [(2.0 * p.x) as i64, (2.0 * p.y) as i64])
                             .collect();
-                        assert_eq!(ring.first(), ring.last());
+                        assert!(ring.is_closed());
                         corners.sort_unstable();
                         corners.dedup();
-                        assert!(corners.len() >= 4 && ring.len() > 4, "{picture}: {ring:?}");
+                        assert!(corners.len() >= 4 && ring.0.len() > 4, "{picture}: {ring:?}");
                     }
                 }
             }
@@ -216,19 +210,20 @@ mod tests {
     #[test]
     fn holes_go_to_the_polygon_around_them() {
         let (level, cols) = level("00000\n0...0\n0.0.0\n0...0\n00000");
-        let [polygons] = &outlines(&level, cols)[..] else { panic!() };
+        let [MultiPolygon(polygons)] = &outlines(&level, cols)[..] else { panic!() };
         assert_eq!(polygons.len(), 2);
-        assert_eq!((polygons[0].holes.len(), polygons[1].holes.len()), (0, 1));
-        let corner = DVec2::splat(-0.5);
-        assert!(polygons[1].exterior.contains(&corner));
-        assert_eq!(polygons[1].exterior.len(), 5);
+        assert_eq!(polygons.iter().map(|p| p.interiors().len()).collect::<Vec<_>>(), [0, 1]);
+        let exterior = &polygons[1].exterior().0;
+        assert!(exterior.contains(&(-0.5, -0.5).into()));
+        assert_eq!(exterior.len(), 5);
     }
 
     #[test]
     fn neighbours_share_the_corners_of_their_border() {
         let (level, cols) = level("000\n112");
-        let outlines = outlines(&level, cols);
-        let meeting = DVec2::new(1.5, 0.5);
-        assert!(outlines.iter().all(|polygons| polygons[0].exterior.contains(&meeting)));
+        let meeting = (1.5, 0.5).into();
+        for polygons in outlines(&level, cols) {
+            assert!(polygons.0[0].exterior().0.contains(&meeting));
+        }
     }
 }

@@ -317,7 +317,7 @@ mod tests {
         assert!(f64::from(farthest) < 1.05 * radius, "{farthest}");
         // No seed is in the cluster of an earlier one.
         for (i, start) in starts.iter().enumerate().skip(1) {
-            let nearest = distance(&starts[..i]).at(start.points[0]).unwrap();
+            let nearest = distance(&starts[..i]).at(start.shapes.points[0]).unwrap();
             assert!(nearest > 0.95 * radius, "{nearest}");
         }
     }

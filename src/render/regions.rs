@@ -1,11 +1,11 @@
 //! Regions on a map: their colours, borders and seeds.
 
+use geo_types::MultiPolygon;
 use glam::{DVec2, Vec2};
 
 use super::canvas::{Canvas, Rgb};
 use super::layout::MapLayout;
 use super::text;
-use crate::region::Polygon;
 
 /// Light colours that differ in hue and in brightness; ColorBrewer's Set3 without its greys.
 const PALETTE: [Rgb; 10] = [
@@ -36,7 +36,7 @@ pub struct RegionLayer<'a> {
     /// Colour of each region.
     pub colours: Vec<Rgb>,
     /// Polygons whose rings are drawn as borders, level by level: the first thickest.
-    pub borders: Vec<&'a [Vec<Polygon>]>,
+    pub borders: Vec<&'a [MultiPolygon<f64>]>,
     /// Points to mark, in grid coordinates.
     pub seeds: Vec<DVec2>,
 }
@@ -51,7 +51,8 @@ impl RegionLayer<'_> {
             let rings: Vec<_> = regions
                 .iter()
                 .flatten()
-                .flat_map(|polygon| polygon.holes.iter().chain([&polygon.exterior]).cloned())
+                .flat_map(|polygon| polygon.interiors().iter().chain([polygon.exterior()]))
+                .map(|ring| ring.coords().map(|at| DVec2::new(at.x, at.y)).collect())
                 .collect();
             let lines = layout.lines(&rings);
             let width = if level + 1 == self.borders.len() { 1.2 } else { 3.0 };

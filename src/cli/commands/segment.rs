@@ -1,10 +1,10 @@
 //! `ridgeway segment`: regions of like shape.
 
+use geo_types::MultiPolygon;
 use ridgeway::eikonal::TensorField;
 use ridgeway::export::{Samples, regions_geojson};
 use ridgeway::region::{
-    Level, Neighbours, Polygon, RegionStatistics, Segmentation, Signature, outlines, signatures,
-    statistics,
+    Level, Neighbours, RegionStatistics, Segmentation, Signature, outlines, signatures, statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
 use ridgeway::{Control, HeightSurface, MetricField, Result, Solver, Surface, Terrain};
@@ -131,7 +131,7 @@ impl Outcome<'_> {
         )
     }
 
-    fn outlines(&self) -> Vec<Vec<Vec<Polygon>>> {
+    fn outlines(&self) -> Vec<Vec<MultiPolygon<f64>>> {
         let levels = self.segmentation.levels.iter();
         levels.map(|level| outlines(level, self.segmentation.cols)).collect()
     }

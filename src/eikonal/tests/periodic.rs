@@ -249,13 +249,11 @@ fn lines_and_areas_go_over_the_seam() {
     let f = || closed(60, 50, [true, true], |_, _| Some(IDENTITY));
     let ring = |x: f64, y: f64| {
         let ring = [[0.0, 0.0], [12.0, 0.0], [12.0, 9.0], [0.0, 9.0]];
-        ring.map(|p| DVec2::from(p) + DVec2::new(x, y)).to_vec()
+        line(ring.map(|p| DVec2::from(p) + DVec2::new(x, y)))
     };
-    let map = |lines: Vec<Vec<DVec2>>, areas: Vec<Vec<Vec<DVec2>>>| {
-        solve_as(Accuracy::Fast, f(), &[StartRegion { lines, areas, ..StartRegion::default() }])
-    };
+    let map = |start: StartRegion| solve_as(Accuracy::Fast, f(), &[start]);
     for (x, y) in [(54.0, 45.0), (-6.0, -5.0), (114.0, 45.0)] {
-        let over = map(vec![], vec![vec![ring(x, y)]]);
+        let over = map(Polygon::new(ring(x, y), vec![]).into());
         let exact = |c: usize, r: usize| {
             let way = DVec2::new(c as f64 - x, r as f64 - y) - DVec2::new(6.0, 4.5);
             let beside = |v: DVec2| (v.abs() - DVec2::new(6.0, 4.5)).max(DVec2::ZERO).length();
@@ -267,7 +265,7 @@ fn lines_and_areas_go_over_the_seam() {
         assert_eq!(over.at(DVec2::new(60.7, -0.4)), Some(0.0));
     }
     // A line once around, and on.
-    let helix = map(vec![vec![DVec2::new(10.0, 10.0), DVec2::new(130.0, 60.0)]], vec![]);
+    let helix = map(line([DVec2::new(10.0, 10.0), DVec2::new(130.0, 60.0)]).into());
     for (at, distance) in [((10, 10), 0.0), ((10, 35), 0.0), ((40, 22), 0.5), ((40, 35), 12.5)] {
         let exact = distance * 12.0 / 13.0;
         let found = helix.at_node(at.0, at.1);
@@ -322,10 +320,7 @@ fn too_few_nodes_and_too_many_turns_are_errors() {
         let [cols, rows] = directions.map(|periodic| if periodic { 3 } else { 1 });
         assert!(field(cols, rows, |_, _| Some(IDENTITY)).periodic(directions).is_ok());
     }
-    let around = StartRegion {
-        lines: vec![vec![DVec2::ZERO, DVec2::new(1e9, 4.0)]],
-        ..StartRegion::default()
-    };
+    let around = line([DVec2::ZERO, DVec2::new(1e9, 4.0)]).into();
     let f = closed(20, 20, [true, false], |_, _| Some(IDENTITY));
     let solved = Solver::default().solve_field(f, &[around], &Stop::Never, &Control::default());
     assert!(matches!(solved, Err(Error::Argument(_))));

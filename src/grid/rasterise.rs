@@ -1,19 +1,23 @@
-//! The cells that points, lines and areas touch.
+//! The cells that geometry touches.
 
 use glam::DVec2;
-use ridgeway::{GridFrame, StartRegion};
 
-/// Marks, row-major, every cell that `shapes` touch: the cells a line runs through are joined by
-/// their sides, so no step between neighbours, diagonal ones included, slips through them.
-pub(crate) fn cover(frame: &GridFrame, shapes: &StartRegion) -> Vec<bool> {
+use super::frame::GridFrame;
+use super::shapes::{Shapes, nodes_inside};
+use super::tiling::Tiling;
+
+/// Marks, row-major, every cell that the shapes touch: the cells a line runs through are joined by their sides, so no step between
+/// neighbours, diagonal ones included, slips through them.
+#[must_use]
+pub fn rasterise(frame: &GridFrame, shapes: &Shapes) -> Vec<bool> {
     let mut cells = Cells { frame, touched: vec![false; frame.nodes()] };
-    shapes.points.iter().for_each(|&point| cells.segment(point, point));
-    shapes.lines.iter().for_each(|line| cells.polyline(line));
-    shapes.areas.iter().flatten().for_each(|ring| cells.polyline(ring));
+    shapes.points.iter().for_each(|&point| cells.touch_along(point, point));
+    shapes.segments().for_each(|[a, b]| cells.touch_along(a, b));
     // And those whose centre lies inside.
-    shapes.nodes_inside(frame.cols(), frame.rows(), |col, row| {
-        cells.touched[frame.index(col, row)] = true;
-    });
+    let tiling = Tiling::new(frame.cols(), frame.rows());
+    for polygon in &shapes.polygons {
+        nodes_inside(polygon, &tiling, |col, row| cells.touched[frame.index(col, row)] = true);
+    }
     cells.touched
 }
 
@@ -23,13 +27,9 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    fn polyline(&mut self, line: &[DVec2]) {
-        line.windows(2).for_each(|ends| self.segment(ends[0], ends[1]));
-    }
-
     /// Walks from cell to cell through their sides: Amanatides & Woo, A Fast Voxel Traversal
     /// Algorithm for Ray Tracing, Eurographics 1987.
-    fn segment(&mut self, a: DVec2, b: DVec2) {
+    fn touch_along(&mut self, a: DVec2, b: DVec2) {
         let size = DVec2::new(self.frame.cols() as f64, self.frame.rows() as f64);
         // From here on a cell's corner, not its centre, has whole coordinates.
         let Some((a, b)) = clip(a + 0.5, b + 0.5, size) else { return };
@@ -78,33 +78,32 @@ fn clip(a: DVec2, b: DVec2, size: DVec2) -> Option<(DVec2, DVec2)> {
 
 #[cfg(test)]
 mod tests {
-    use ridgeway::Ground;
+    use geo_types::{Geometry, LineString, MultiPoint, Polygon};
 
     use super::*;
+    use crate::grid::Ground;
 
-    fn picture(cols: usize, rows: usize, shapes: &StartRegion) -> Vec<String> {
+    fn picture(cols: usize, rows: usize, geometry: impl Into<Geometry<f64>>) -> Vec<String> {
         let frame = GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap();
-        cover(&frame, shapes)
+        rasterise(&frame, &Shapes::from(geometry))
             .chunks(cols)
             .map(|row| row.iter().map(|&t| if t { '#' } else { '.' }).collect())
             .collect()
     }
 
-    fn line(points: &[(f64, f64)]) -> Vec<DVec2> {
-        points.iter().map(|&p| p.into()).collect()
+    fn line(points: &[(f64, f64)]) -> LineString<f64> {
+        points.to_vec().into()
     }
 
     #[test]
     fn lines_are_joined_by_sides() {
-        let lines = vec![line(&[(-9.0, -6.0), (0.0, 0.0), (3.0, 2.0), (300.0, 200.0)])];
-        let drawn = picture(5, 4, &StartRegion { lines, ..Default::default() });
+        let drawn = picture(5, 4, line(&[(-9.0, -6.0), (0.0, 0.0), (3.0, 2.0), (300.0, 200.0)]));
         assert_eq!(drawn, ["##...", ".##..", "..###", "....#"].map(String::from));
     }
 
     #[test]
     fn diagonal_lines_do_not_leak() {
-        let lines = vec![line(&[(0.0, 0.0), (3.0, 3.0)])];
-        let drawn = picture(4, 4, &StartRegion { lines, ..Default::default() });
+        let drawn = picture(4, 4, line(&[(0.0, 0.0), (3.0, 3.0)]));
         let joined = (0..3)
             .all(|i| drawn[i + 1].as_bytes()[i] == b'#' || drawn[i].as_bytes()[i + 1] == b'#');
         assert!(joined, "{drawn:?}");
@@ -114,8 +113,7 @@ mod tests {
     fn areas_are_filled_and_keep_their_holes() {
         let outer = line(&[(0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0), (0.0, 0.0)]);
         let hole = line(&[(2.0, 2.0), (4.0, 2.0), (4.0, 4.0), (2.0, 4.0), (2.0, 2.0)]);
-        let drawn =
-            picture(8, 7, &StartRegion { areas: vec![vec![outer, hole]], ..Default::default() });
+        let drawn = picture(8, 7, Polygon::new(outer, vec![hole]));
         assert_eq!(drawn[0], "#######.");
         assert_eq!(drawn[3], "###.###.");
         assert_eq!(drawn[6], "#######.");
@@ -124,12 +122,10 @@ mod tests {
     #[test]
     fn far_and_outside_shapes_are_harmless() {
         let far = line(&[(-1e300, 1e300), (1e300, 1e300), (1e300, -1e300), (-1e300, 1e300)]);
-        let shapes = StartRegion {
-            points: vec![DVec2::splat(-7.0), DVec2::splat(1e18)],
-            lines: vec![far.clone(), line(&[(-5.0, -1.0), (9.0, -1.0)])],
-            areas: vec![vec![far]],
-            ..StartRegion::default()
-        };
-        picture(3, 2, &shapes);
+        let points = MultiPoint::from(vec![(-7.0, -7.0), (1e18, 1e18)]);
+        let outside = line(&[(-5.0, -1.0), (9.0, -1.0)]);
+        let all: [Geometry<f64>; 4] =
+            [points.into(), far.clone().into(), outside.into(), Polygon::new(far, vec![]).into()];
+        picture(3, 2, Geometry::GeometryCollection(all.to_vec().into()));
     }
 }

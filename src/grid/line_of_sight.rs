@@ -1,0 +1,36 @@
+//! Line of sight between points of a grid, some nodes of which are closed.
+
+use glam::DVec2;
+
+/// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones; `is_open` tells
+/// the nodes by column and row, also those outside.
+pub(crate) fn in_sight(a: DVec2, b: DVec2, is_open: impl Fn(isize, isize) -> bool) -> bool {
+    /// Samples per cell of length: a wall in a cell is crossed by more than one of them or hardly touched.
+    const DENSITY: f64 = 8.0;
+    let steps = (a.distance(b) * DENSITY).ceil().max(1.0);
+    (0..=steps as usize).all(|i| {
+        let p = a.lerp(b, i as f64 / steps);
+        let (col, row) = (p.x.floor() as isize, p.y.floor() as isize);
+        let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| is_open(col + i, row + j));
+        corners == [true; 4] || on_free_side(corners, p - p.floor(), a, b, p.floor())
+    })
+}
+
+/// In a cell with closed corners: whether the way stays on the side of its own end's corner.
+fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) -> bool {
+    // The nearest corner, or one of the nearest, must be open, ...
+    let distance = |i: usize| at.distance_squared(DVec2::new((i % 2) as f64, (i / 2) as f64));
+    let nearest = (0..4).map(distance).fold(f64::INFINITY, f64::min);
+    if !(0..4).any(|i| corners[i] && distance(i) <= nearest + 1e-9) {
+        return false;
+    }
+    // ... and where a wall runs along a diagonal, the whole way must lie on one side of it.
+    let side = |p: DVec2, rising: bool| {
+        let q = p - cell;
+        if rising { q.x - q.y } else { q.x + q.y - 1.0 }
+    };
+    let crosses = |rising: bool| side(a, rising) * side(b, rising) < 0.0;
+    let falling_wall = !corners[1] && !corners[2];
+    let rising_wall = !corners[0] && !corners[3];
+    !(falling_wall && crosses(false) || rising_wall && crosses(true))
+}
