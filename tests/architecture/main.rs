@@ -223,3 +223,19 @@ fn tests_comments_and_visibility_import_nothing() {
     ]);
     assert!(found.is_empty(), "{found:?}");
 }
+
+#[test]
+fn every_dependency_is_listed_with_its_reason() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
+    let manifest = read("Cargo.toml");
+    let list = read("docs/dependencies.md");
+    let tables = manifest.split("\n[").filter(|table| table.contains("dependencies]\n"));
+    let crates: Vec<_> = tables
+        .flat_map(|table| table.lines().filter_map(|line| line.split_once(" = ")))
+        .map(|(name, _)| name)
+        .collect();
+    let missing: Vec<_> =
+        crates.iter().filter(|name| !list.contains(&format!("`{name}`"))).collect();
+    assert!(crates.len() > 20 && missing.is_empty(), "not in docs/dependencies.md: {missing:?}");
+}
