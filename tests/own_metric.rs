@@ -110,7 +110,7 @@ fn a_metric_without_a_quadratic_form_measures_but_is_not_solved() {
 
     let solved = Solver::default().solve(&metric, &[west.into()], &Stop::Never, &control);
     let refusal = solved.unwrap_err().to_string();
-    assert!(refusal.contains("the metric wind has no quadratic form"), "{refusal}");
+    assert!(refusal.contains("the metric wind is one without a quadratic form"), "{refusal}");
     let plain = ridgeway::metric::Tensor { tensors: vec![Sym2::new(1.0, 0.0, 1.0); 4141].into() };
     let plain = plain.on(&surface, &Modifiers::default(), &control).unwrap();
     let map = Solver::default().solve(&plain, &[west.into()], &Stop::Never, &control).unwrap();

@@ -28,7 +28,7 @@ impl Delta {
     /// It is not positive and finite.
     pub(super) fn number(self) -> Result<f64> {
         let (value, what) = match self {
-            Self::Absolute(delta) => (delta, "delta"),
+            Self::Absolute(delta) => (delta, "the offset delta"),
             Self::Auto(share) => (share, "the share of the curvature that delta is to be"),
         };
         if value.is_finite() && value > 0.0 {

@@ -94,19 +94,19 @@ fn rings(mut sides: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     sides.sort_unstable();
     let mut used = vec![false; sides.len()];
     let mut rings = Vec::new();
-    let mut way: Vec<usize> = Vec::new();
-    // Where on the way each of its corners is.
+    let mut path: Vec<usize> = Vec::new();
+    // Where on the path each of its corners is.
     let mut places = HashMap::new();
     for first in 0..sides.len() {
         let mut next = (!used[first]).then_some(first);
         while let Some(side) = next {
             used[side] = true;
             let [from, to] = sides[side];
-            places.insert(from, way.len());
-            way.push(from);
-            // The way has come round to a corner: what lies between is a ring.
+            places.insert(from, path.len());
+            path.push(from);
+            // The path has come round to a corner: what lies between is a ring.
             if let Some(&start) = places.get(&to) {
-                let ring = way.split_off(start);
+                let ring = path.split_off(start);
                 for corner in &ring {
                     places.remove(corner);
                 }
@@ -116,7 +116,7 @@ fn rings(mut sides: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
             next = (leaving..sides.len())
                 .take_while(|&side| sides[side][0] == to)
                 .find(|&side| !used[side])
-                .filter(|_| !way.is_empty());
+                .filter(|_| !path.is_empty());
         }
     }
     rings

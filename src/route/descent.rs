@@ -33,7 +33,7 @@ pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
         }
         line.push(at);
     };
-    // The straight way home in such steps too; a single one, of no length, if the goal is on the start.
+    // Straight to the start in such steps too; a single one, of no length, if the goal is on the start.
     let steps = (at.distance(home) / STEP).ceil().max(1.0);
     line.extend((1..steps as usize).map(|i| at.lerp(home, i as f64 / steps)));
     if home != at || line.len() == 1 {

@@ -41,7 +41,7 @@ impl HeightJet {
     /// Upward unit normal `(−zx, −zy, 1)/√(1+|∇z|²)`.
     #[must_use]
     pub fn normal(&self) -> DVec3 {
-        DVec3::new(-self.zx, -self.zy, 1.0) / self.stretch()
+        DVec3::new(-self.zx, -self.zy, 1.0) / self.area_factor()
     }
 
     /// First fundamental form `G = I + ∇z ∇zᵀ`: `√(vᵀGv)` is the length on the surface of a plan vector `v`.
@@ -53,7 +53,7 @@ impl HeightJet {
     /// Second fundamental form `B = Hess z/√(1+|∇z|²)`, 1/m.
     #[must_use]
     pub fn second_form(&self) -> Sym2 {
-        let [xx, xy, yy] = [self.zxx, self.zxy, self.zyy].map(|h| h / self.stretch());
+        let [xx, xy, yy] = [self.zxx, self.zxy, self.zyy].map(|h| h / self.area_factor());
         Sym2::new(xx, xy, yy)
     }
 
@@ -69,7 +69,7 @@ impl HeightJet {
         // In the G-orthonormal pair along the gradient and the contour, e1 = ĝ/√(1+|∇z|²) and e2 ⊥ ĝ, the
         // pencil B w = κ G w becomes an ordinary symmetric eigenproblem [a b; b c].
         let uphill = self.gradient().normalize_or(DVec2::X);
-        let (e1, e2) = (uphill / self.stretch(), uphill.perp());
+        let (e1, e2) = (uphill / self.area_factor(), uphill.perp());
         let b = self.second_form();
         let form = |v: DVec2, w: DVec2| {
             b.xx * v.x * w.x + b.xy * (v.x * w.y + v.y * w.x) + b.yy * v.y * w.y
@@ -103,7 +103,7 @@ impl HeightJet {
 
     /// Surface area per plan area, `√(1+|∇z|²)`.
     #[inline(always)]
-    fn stretch(&self) -> f64 {
+    fn area_factor(&self) -> f64 {
         (1.0 + self.gradient().length_squared()).sqrt()
     }
 }
@@ -127,7 +127,7 @@ impl Kernel for BlockSums<'_> {
                 let jet = self.jets.jet(row, i);
                 let (counts, square) = (plan[i] > 0.0, jet.squared_curvature());
                 squares[i] += if counts { square } else { 0.0 };
-                let area = plan[i] * jet.stretch();
+                let area = plan[i] * jet.area_factor();
                 areas[i] += if counts { area } else { 0.0 };
             }
         }

@@ -115,7 +115,7 @@ impl<'a> Tensors<'a> {
     /// The tensor beside a border or a seam: nodes one by one, and only those that count.
     #[inline(never)]
     fn sample(&self, at: DVec2, region: u32) -> Option<Tensor> {
-        // Beside a pole a short way may go round it many times.
+        // Beside a pole a short line may go round it many times.
         const FAR: f64 = 1e9;
         let low = at.floor();
         let is_near = low.is_finite() && low.abs().max_element() < FAR;

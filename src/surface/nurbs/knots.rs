@@ -143,7 +143,7 @@ impl Knots {
         spans.filter(|ends| ends[0] < ends[1]).map(|ends| [ends[0], ends[1]])
     }
 
-    /// The index `k` with `u_k ≤ u < u_{k+1}` in the domain; at its end, that of the last stretch.
+    /// The index `k` with `u_k ≤ u < u_{k+1}` in the domain; at its end, that of the last interval.
     fn span(&self, u: f64) -> usize {
         let inner = &self.knots[self.degree + 1..self.controls()];
         let [_, to] = self.domain();

@@ -1,0 +1,70 @@
+//! Dynamic programming over lines beside a line.
+
+use glam::DVec2;
+
+use super::{MOST_STEPS, across, finely, refine};
+use crate::linalg::Sym2;
+
+/// Steps of the search in cells. The finer ones are of no use before the coarser.
+const STRIDES: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
+/// A search that shortens the line by less than this share goes on with the next stride.
+const WORTH: f64 = 1e-4;
+
+/// The line moved sideways by ever smaller steps, each time to the best of all lines beside it.
+pub(super) fn search(
+    mut line: Vec<DVec2>,
+    metric: &impl Fn(DVec2) -> Sym2,
+    clear: &impl Fn(DVec2, DVec2) -> bool,
+) -> Vec<DVec2> {
+    let mut least = finely(&line, metric);
+    for stride in STRIDES {
+        line = refine(&line);
+        for _ in 0..MOST_STEPS {
+            let (length, moved) = best_beside(&line, stride, metric, clear);
+            if length.is_nan() || length >= (1.0 - WORTH) * least {
+                break;
+            }
+            (least, line) = (length, moved);
+        }
+    }
+    line
+}
+
+/// The shortest of the lines whose points each stay or go a stride to either side, and its length: the best path to each
+/// place of a point goes by the best path to a place of the point before it.
+fn best_beside(
+    line: &[DVec2],
+    stride: f64,
+    metric: &impl Fn(DVec2) -> Sym2,
+    clear: &impl Fn(DVec2, DVec2) -> bool,
+) -> (f64, Vec<DVec2>) {
+    let last = line.len() - 1;
+    let across = across(line);
+    let stride_across = |i: usize| if i > 0 && i < last { across[i] * stride } else { DVec2::ZERO };
+    // The first place is to stay: that is always allowed, and wins where nothing is gained.
+    let places = |i: usize| [0.0, 1.0, -1.0].map(|side| line[i] + stride_across(i) * side);
+    let mut lengths = [0.0; 3];
+    let mut predecessors = Vec::with_capacity(last);
+    for i in 1..line.len() {
+        let (from, to) = (places(i - 1), places(i));
+        let path = |j: usize, k: usize| {
+            let open = (j, k) == (0, 0) || clear(from[j], to[k]);
+            if open { lengths[j] + finely(&[from[j], to[k]], metric) } else { f64::INFINITY }
+        };
+        let best = [0, 1, 2].map(|k| {
+            let paths = [0, 1, 2].map(|j| path(j, k));
+            let least = (1..3).fold(0, |best, j| if paths[j] < paths[best] { j } else { best });
+            (paths[least], least)
+        });
+        lengths = best.map(|(length, _)| length);
+        predecessors.push(best.map(|(_, predecessor)| predecessor));
+    }
+    let mut place = 0;
+    let mut moved = vec![line[last]];
+    for (i, predecessors) in predecessors.iter().enumerate().rev() {
+        place = predecessors[place];
+        moved.push(places(i)[place]);
+    }
+    moved.reverse();
+    (lengths[0], moved)
+}
