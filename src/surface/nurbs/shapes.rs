@@ -67,7 +67,7 @@ impl NurbsSurface {
     /// Jüttler, Zheng and Liu, Computation of Rotation Minimizing Frames, 2008): a cubic loft through the section at
     /// `stations` places.
     ///
-    /// The section is given as who travels sees it: x to the right, y up, the trajectory passing through its origin. `up` tells what is up
+    /// The section is given in the frame of a traveller: x to the right, y up, the trajectory through its origin. `up` is the direction up
     /// at the beginning. The first parameter is the section's, the second runs along the trajectory. The normal points
     /// outwards if the section runs counter-clockwise.
     ///
