@@ -91,7 +91,7 @@ impl NurbsSurface {
     /// The surface of a JSON text.
     ///
     /// # Errors
-    /// [`Error::Argument`] that tells what is wrong.
+    /// [`Error::Argument`] that says what is wrong.
     pub fn from_json(text: &str) -> Result<Self> {
         Self::parse(text.as_bytes())
     }

@@ -29,7 +29,7 @@ impl Knots {
     pub const MAX_CONTROLS: usize = 1_000_000;
 
     /// # Errors
-    /// [`Error::Argument`] that tells which invariant does not hold.
+    /// [`Error::Argument`] that says which invariant does not hold.
     pub fn new(degree: usize, knots: Vec<f64>) -> Result<Self> {
         if !(1..=Self::MAX_DEGREE).contains(&degree) {
             let most = Self::MAX_DEGREE;
