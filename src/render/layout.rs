@@ -4,7 +4,8 @@ use glam::{DVec2, Vec2};
 use image::RgbaImage;
 use rayon::prelude::*;
 
-use super::canvas::{Canvas, Rgb};
+use super::canvas::Canvas;
+use super::colour::Rgb;
 use super::relief::VOID;
 use super::text;
 use crate::control::Control;

@@ -1,35 +1,20 @@
 //! A map: shaded terrain, regions, isolines, routes, start and goal.
 
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 use image::RgbaImage;
 
-use super::canvas::Rgb;
+use super::colour::Rgb;
+use super::isolines::{IsolineLayer, draw_isolines, draw_labels};
 use super::layout::{Item, MapLayout, SIDE};
 use super::png::encode_png;
 use super::regions::RegionLayer;
 use super::relief::Relief;
-use super::text;
 use crate::control::Control;
 use crate::error::{Error, Result};
-use crate::grid::{GridFrame, Isoline};
+use crate::grid::GridFrame;
 
-/// Every so many isolines one is thick and labelled.
-const MAJOR: usize = 5;
-/// Size of the labels of isolines, in pixels of a picture of the default size.
-const LABEL: f32 = 17.0;
 /// Barriers are drawn in this colour, mixed half and half with the ground.
 const BARRIER: Rgb = Rgb(0x20, 0x20, 0x28);
-
-/// Isolines of one distance.
-#[derive(Clone, Debug)]
-pub struct IsolineLayer<'a> {
-    /// The lines.
-    pub isolines: &'a [Isoline],
-    /// Their colour.
-    pub colour: Rgb,
-    /// What the legend says; empty for no entry.
-    pub label: String,
-}
 
 /// One route.
 #[derive(Clone, Debug)]
@@ -200,67 +185,10 @@ impl<'a> MapPicture<'a> {
     }
 }
 
-/// A value written on its isoline.
-struct Label {
-    middle: Vec2,
-    half: Vec2,
-    text: String,
-    colour: Rgb,
-}
-
-/// Thin lines, every fifth thicker; and where along each thick one its label may go, best first.
-fn draw_isolines(layout: &mut MapLayout, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>> {
-    let mut labels = Vec::new();
-    for (i, isoline) in layer.isolines.iter().enumerate() {
-        let lines = layout.lines(&isoline.lines);
-        let major = (i + 1) % MAJOR == 0;
-        let (width, opacity) = if major { (2.2, 0.8) } else { (1.1, 0.6) };
-        layout.canvas.lines(&lines, width * layout.unit, layer.colour, opacity);
-        if major && let Some(longest) = lines.iter().max_by_key(|line| line.len()) {
-            labels.push(label_places(
-                longest,
-                &text::number(isoline.level),
-                layer.colour,
-                layout.unit,
-            ));
-        }
-    }
-    labels
-}
-
-fn label_places(line: &[Vec2], text: &str, colour: Rgb, unit: f32) -> Vec<Label> {
-    let size = LABEL * unit;
-    let half = Vec2::new(text::width(text, size) / 2.0 + 4.0 * unit, 0.6 * size);
-    [8, 4, 12, 6, 10, 2, 14, 5, 11, 3, 13]
-        .map(|sixteenths| line[line.len() * sixteenths / 16])
-        .map(|middle| Label { middle, half, text: text.to_owned(), colour })
-        .into()
-}
-
-/// Draws each label in its first place that is on the map and free of `taken` points and of other
-/// labels; a label without such a place is left out.
-fn draw_labels(layout: &mut MapLayout, labels: Vec<Vec<Label>>, taken: &[Vec2]) {
-    let size = LABEL * layout.unit;
-    let mut drawn: Vec<Label> = Vec::new();
-    for places in labels {
-        let free = |l: &Label| {
-            let apart = |p: Vec2, reach: Vec2| (p - l.middle).abs().cmpgt(l.half + reach).any();
-            layout.shows(l.middle - l.half)
-                && layout.shows(l.middle + l.half)
-                && taken.iter().all(|&p| apart(p, Vec2::splat(10.0 * layout.unit)))
-                && drawn.iter().all(|d| apart(d.middle, d.half))
-        };
-        if let Some(label) = places.into_iter().find(free) {
-            let width = text::width(&label.text, size);
-            let baseline = label.middle + Vec2::new(-width / 2.0, 0.36 * size);
-            layout.canvas.text(&label.text, size, baseline, label.colour, 3.0 * layout.unit);
-            drawn.push(label);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec2;
+
     use super::*;
     use crate::grid::Ground;
 

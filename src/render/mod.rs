@@ -4,20 +4,28 @@
 //! proportions on the ground, above the scale bar and the legend, which therefore never cover it.
 
 mod canvas;
+mod colour;
 mod field;
+mod gradient;
+mod isolines;
 mod layout;
 mod map;
+mod palette;
 mod plot;
 mod png;
+mod region_numbers;
 mod regions;
 mod relief;
 mod surface;
 mod text;
 
-pub use self::canvas::Rgb;
-pub use self::field::{FieldPicture, Gradient};
-pub use self::map::{IsolineLayer, MapPicture, RouteLayer};
-pub use self::plot::{LogPlot, Mark, pair_colour};
+pub use self::colour::Rgb;
+pub use self::field::FieldPicture;
+pub use self::gradient::Gradient;
+pub use self::isolines::IsolineLayer;
+pub use self::map::{MapPicture, RouteLayer};
+pub use self::palette::{contrasting_colours, pair_colour};
+pub use self::plot::{LogPlot, Mark};
 pub use self::png::encode_png;
-pub use self::regions::{RegionLayer, contrasting_colours};
+pub use self::regions::RegionLayer;
 pub use self::surface::{SurfacePicture, beside};

@@ -3,7 +3,8 @@
 use glam::{DVec2, Vec2};
 use image::RgbaImage;
 
-use super::canvas::{Canvas, Rgb};
+use super::canvas::Canvas;
+use super::colour::Rgb;
 use super::png::encode_png;
 use super::text;
 use crate::error::{Error, Result};
@@ -17,15 +18,6 @@ const BOTTOM: f32 = 110.0;
 const TEXT: f32 = 24.0;
 const MARK: f32 = 9.0;
 const GRID: Rgb = Rgb(0xdd, 0xdd, 0xdd);
-
-/// Colour of the regions of a match: the nine most alike pairs have their own, others and the unmatched (`None`) are grey.
-#[must_use]
-pub fn pair_colour(rank: Option<usize>) -> Rgb {
-    const UNMATCHED: Rgb = Rgb(0xc8, 0xc8, 0xc8);
-    // The tenth is a grey.
-    let colour = rank.and_then(|rank| colorous::TABLEAU10[..9].get(rank));
-    colour.map_or(UNMATCHED, |c| Rgb(c.r, c.g, c.b))
-}
 
 /// A point of a [`LogPlot`].
 #[derive(Clone, Debug)]

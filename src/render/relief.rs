@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3, Vec4};
 use rayon::prelude::*;
 
-use super::canvas::Rgb;
+use super::colour::Rgb;
 use crate::grid::GridFrame;
 
 /// Tint from the lowest to the highest ground. Pale and little saturated, so that lines stand out.

@@ -4,10 +4,11 @@ use glam::{DVec2, DVec3, Vec2};
 use image::RgbaImage;
 use rayon::prelude::*;
 
-use super::canvas::{Canvas, Rgb};
+use super::canvas::Canvas;
+use super::colour::Rgb;
 use super::layout::{SIDE, SIDES};
 use super::png::encode_png;
-use super::regions::draw_numbers;
+use super::region_numbers::draw_numbers;
 use super::text;
 use crate::error::{Error, Result};
 use crate::surface::Surface;
