@@ -43,6 +43,9 @@ pub enum Error {
     /// The caller asked for something impossible: a place outside the grid, a negative length, …
     #[error("{0}")]
     Argument(Box<Mismatch>),
+    /// A start or a goal cannot be used.
+    #[error("{0}")]
+    Place(Box<BadPlace>),
     /// No path leads from the start to the goal.
     #[error(
         "no path leads from the start to the goal at {goal}{}{}",
@@ -113,6 +116,53 @@ pub struct Mismatch {
     pub expected: Option<String>,
     /// What to do, where that is known.
     pub advice: Option<String>,
+}
+
+/// A start or a goal that cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BadPlace {
+    /// What the place is for.
+    pub role: Role,
+    /// The place as it was given, such as `pixel:3,4`.
+    pub name: String,
+    /// What is wrong with it.
+    pub trouble: Trouble,
+    /// The nearest place that would do, written in the same way; `None` if there is none, or it makes no sense to look for one.
+    pub nearest: Option<String>,
+}
+
+/// What a place is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Paths begin there.
+    Start,
+    /// Paths end there.
+    Goal,
+}
+
+/// What is wrong with a place.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Trouble {
+    /// It lies outside the DEM.
+    Outside {
+        /// The first corner of the DEM: south-west, or of pixels north-west.
+        from: String,
+        /// The opposite corner.
+        to: String,
+        /// What its two numbers are called, and the place with the two swapped, if that lies on the DEM.
+        swapped: Option<(&'static str, String)>,
+    },
+    /// It lies on a void.
+    Void,
+    /// It lies on a barrier.
+    Barrier,
+    /// The metric lets nobody enter because of these; if none, because it is too extreme there.
+    Closed(Vec<Obstacle>),
+    /// It is a file with lines or areas where points are needed.
+    NotPoints,
+    /// It is a file whose lines and areas touch no open cell of the DEM.
+    OffGround,
 }
 
 /// Where in an input something stands.
@@ -289,6 +339,65 @@ impl fmt::Display for Mismatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (found, advice) = self.clauses();
         write!(f, "{found}{}", clause(&advice))
+    }
+}
+
+impl BadPlace {
+    /// What is wrong with the place, and where a better one is: the predicate of a sentence about it.
+    #[must_use]
+    pub fn account(&self) -> String {
+        let Self { trouble, nearest, .. } = self;
+        let advice = match (trouble, nearest) {
+            (Trouble::NotPoints | Trouble::OffGround, _)
+            | (Trouble::Outside { swapped: Some(_), .. }, _)
+            | (Trouble::Outside { .. }, None) => String::new(),
+            (Trouble::Outside { .. }, Some(near)) => format!("; the nearest place on it is {near}"),
+            (_, Some(near)) => format!("; the nearest good place is {near}"),
+            (_, None) => ", and so does every other cell".to_owned(),
+        };
+        format!("{trouble}{advice}")
+    }
+}
+
+impl fmt::Display for BadPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the {} {} {}", self.role, self.name, self.account())
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Start => "start",
+            Self::Goal => "goal",
+        })
+    }
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Outside { from, to, swapped } => {
+                write!(f, "lies outside the DEM, which reaches from {from} to {to}")?;
+                match swapped {
+                    Some((axes, place)) => write!(f, "; {axes} look swapped: try {place}"),
+                    None => Ok(()),
+                }
+            }
+            Self::Void => f.write_str("lies on a void of the DEM"),
+            Self::Barrier => f.write_str("lies on a barrier"),
+            Self::Closed(by) if by.is_empty() => {
+                f.write_str("lies where the metric is too extreme to compute with")
+            }
+            Self::Closed(by) => {
+                let by: Vec<_> = by.iter().map(Obstacle::to_string).collect();
+                write!(f, "lies where the metric lets nobody enter: {}", by.join(", "))
+            }
+            Self::NotPoints => f.write_str("holds lines or areas; only points will do"),
+            Self::OffGround => f.write_str(
+                "touches no open cell of the DEM; the file must be in longitude and latitude (RFC 7946) and overlap the DEM",
+            ),
+        }
     }
 }
 

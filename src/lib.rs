@@ -66,6 +66,7 @@
 //! Without features (`default-features = false`) a DEM is read, a surface fitted, distances solved and routes traced.
 //!
 //! * `export`: files of routes, isolines, regions and rasters ([`export`]).
+//! * `plan`: questions and reports, with `export` ([`plan`]).
 //! * `render`: pictures ([`render`]).
 //! * `zip`: SRTM tiles are read from zip archives too.
 //! * `cli` (default): the `ridgeway` command, with all of the above.
@@ -80,6 +81,8 @@ pub mod export;
 pub mod grid;
 pub mod linalg;
 pub mod metric;
+#[cfg(feature = "plan")]
+pub mod plan;
 pub mod region;
 #[cfg(feature = "render")]
 pub mod render;

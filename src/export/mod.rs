@@ -34,3 +34,36 @@ pub fn digits(value: f64) -> String {
         format!("{value:.3e}")
     }
 }
+
+/// A length with its unit: `823 m`, `12.34 km`; under a hundredth of a millimetre, which only
+/// rounding makes, `0 m`.
+#[must_use]
+pub fn metres(value: f64) -> String {
+    if value.abs() < 1e-5 {
+        "0 m".into()
+    } else if value.abs() >= 10_000.0 {
+        format!("{:.2} km", value / 1000.0)
+    } else if value.abs() >= 100.0 {
+        format!("{value:.0} m")
+    } else {
+        format!("{} m", digits(value))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(digits(0.012_345_6), "0.01235");
+        assert_eq!(digits(3.0), "3.000");
+        assert_eq!(digits(123_456.7), "123457");
+        assert_eq!(digits(1.5e-9), "1.500e-9");
+        assert_eq!(digits(f64::NAN), "NaN");
+        assert_eq!(metres(12_344.0), "12.34 km");
+        assert_eq!(metres(823.4), "823 m");
+        assert_eq!(metres(0.007_108), "0.007108 m");
+        assert_eq!(metres(-2.7e-13), "0 m");
+    }
+}

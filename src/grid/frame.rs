@@ -155,6 +155,15 @@ impl GridFrame {
         self.step
     }
 
+    /// West, south, east and north border of the outermost cells, in map units.
+    #[must_use]
+    pub fn extent(&self) -> [f64; 4] {
+        let half = 0.5 * self.step;
+        let size = self.step * DVec2::new(self.cols as f64, self.rows as f64);
+        let (west, north) = (self.origin.x - half.x, self.origin.y + half.y);
+        [west, north - size.y, west + size.x, north]
+    }
+
     /// How map units measure on the ground.
     #[must_use]
     pub fn ground(&self) -> Ground {

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use serde::Serialize;
+
 use super::active_set::{ActiveSet, ITSELF, Job};
 use super::stop::{Progress, Stop};
 use super::tile_store::TileStore;
@@ -25,7 +27,7 @@ const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 pub(crate) const WINDOW_CELLS: f32 = 10.0;
 
 /// How much work a solve took: the same on every machine and for every number of threads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Statistics {
     /// Tiles of the grid that were ever solved.
     pub tiles: usize,

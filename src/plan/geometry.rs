@@ -1,0 +1,82 @@
+//! Geometry files.
+
+use std::fs;
+use std::path::Path;
+
+use geo_types::Geometry;
+use geojson::GeoJson;
+
+use crate::error::{Error, Result};
+use crate::grid::Shapes;
+use crate::terrain::Georeference;
+
+/// Points, lines and areas of a GeoJSON file (RFC 7946: longitude and latitude) in grid coordinates.
+///
+/// # Errors
+/// The file cannot be read, is not GeoJSON, holds no geometry; the grid has no CRS.
+pub fn read_geojson(path: impl AsRef<Path>, georeference: &Georeference) -> Result<Shapes> {
+    let path = path.as_ref();
+    let text = fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
+    if text.is_empty() {
+        return Err(Error::format(path, "the file is empty"));
+    }
+    let shapes = lonlat_shapes(&text)
+        .map_err(|error| Error::format(path, format!("is not GeoJSON: {error}")))?
+        .try_map(|lonlat| georeference.from_lonlat(lonlat))
+        .map_err(|error| error.in_file(path))?;
+    if shapes.is_empty() {
+        return Err(Error::format(path, "holds no points, lines or areas"));
+    }
+    Ok(shapes)
+}
+
+/// All geometry of a GeoJSON text, in longitude and latitude.
+fn lonlat_shapes(text: &str) -> std::result::Result<Shapes, geojson::Error> {
+    let geometries: Vec<_> = match text.parse()? {
+        GeoJson::Geometry(geometry) => vec![geometry],
+        GeoJson::Feature(feature) => feature.geometry.into_iter().collect(),
+        GeoJson::FeatureCollection(all) => {
+            all.features.into_iter().filter_map(|feature| feature.geometry).collect()
+        }
+    };
+    let mut shapes = Shapes::default();
+    for geometry in geometries {
+        shapes.add(Geometry::try_from(geometry)?);
+    }
+    Ok(shapes)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    #[test]
+    fn geojson_gives_all_its_geometry() {
+        let point = r#"{"type":"Point","coordinates":[1,2,300]}"#;
+        let line = r#"{"type":"LineString","coordinates":[[1,2],[3,4]]}"#;
+        let polygon = r#"{"type":"Polygon","coordinates":[[[0,0],[1,0],[0,1],[0,0]]]}"#;
+        let feature = |geometry: &str| {
+            format!(r#"{{"type":"Feature","properties":{{}},"geometry":{geometry}}}"#)
+        };
+        let all = format!(r#"{{"type":"GeometryCollection","geometries":[{point},{polygon}]}}"#);
+        let features = [feature(line), feature(&all), feature("null")].join(",");
+        let text = format!(r#"{{"type":"FeatureCollection","features":[{features}]}}"#);
+        let shapes = lonlat_shapes(&text).unwrap();
+        assert_eq!(shapes.points, [DVec2::new(1.0, 2.0)]);
+        assert_eq!((shapes.lines.len(), shapes.polygons.len()), (1, 1));
+    }
+
+    #[test]
+    fn positions_of_one_number_are_refused() {
+        for coordinates in ["[1]", "[]"] {
+            let kinds = [("Point", 0), ("LineString", 1), ("Polygon", 2), ("MultiPolygon", 3)];
+            for (kind, depth) in kinds {
+                let nested = "[".repeat(depth) + coordinates + &"]".repeat(depth);
+                let text = format!(r#"{{"type":"{kind}","coordinates":{nested}}}"#);
+                assert!(lonlat_shapes(&text).is_err(), "{text}");
+            }
+        }
+    }
+}
