@@ -16,6 +16,10 @@ use crate::error::{Error, Result};
 use crate::metric::MetricField;
 
 /// Solves the eikonal equation.
+///
+/// Work is shared with the threads of the current rayon pool, and several solves at once share a pool fairly: a small one does not
+/// wait for the end of large ones. To that end a solve of more than some 15 ms that runs on a thread of the pool takes up other
+/// work of the pool now and then, as the operations of rayon do, and goes on when that is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
     /// Iteration stops where a node would change by less than this share of its shortest step. Default 1e-3,

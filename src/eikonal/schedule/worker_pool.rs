@@ -31,7 +31,7 @@ use rayon::{Scope, Yield};
 
 use crate::error::Result;
 
-/// Fewest jobs of a round that are worth calling workers for.
+/// Fewest jobs of a round that are worth calling workers for the first time.
 const MIN_PARALLEL: usize = 4;
 /// Jobs that the leader does alone before it calls workers: some 50 µs, so that the smallest solves, of which there are thousands in
 /// a segmentation, have none. With 256 a solve at 200² took a quarter longer on two threads, at 400² a tenth.
@@ -81,7 +81,7 @@ pub(in crate::eikonal) fn run<const N: usize, W: Default>(
         let _over = OnDrop(|| rounds.round.0.store(Round::OVER, Release));
         for number in 2.. {
             let round = rounds.begin(number, &jobs);
-            if jobs.len() >= MIN_PARALLEL {
+            if jobs.len() > 1 {
                 rounds.call_workers(scope, &work);
             }
             rounds.take_jobs(0, round, |job| work(&mut workspace, job));
