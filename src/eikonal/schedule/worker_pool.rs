@@ -378,33 +378,36 @@ mod tests {
     /// Jobs of a solve that seems never to end.
     const MANY: usize = 20_000_000;
 
-    /// Does jobs in rounds of 12 until there are `most` or it is `over`; gives how many. Each outcome is the job.
-    fn solve(most: usize, over: &AtomicBool) -> Result<usize> {
-        let mut done = 0;
+    /// Does jobs in rounds of 12 until there are `most` or it is `over`, and counts them. Each outcome is the job.
+    fn solve(most: usize, over: &AtomicBool, done: &AtomicUsize) {
         let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 1]]| {
             assert!(jobs.iter().zip(outcomes).all(|(&job, &[outcome])| job == u64::from(outcome)));
-            done += jobs.len();
+            let before = done.fetch_add(jobs.len(), Relaxed) + jobs.len();
             jobs.clear();
-            if done < most && !over.load(Relaxed) {
-                jobs.extend((done as u64..).take(12));
+            if before < most && !over.load(Relaxed) {
+                jobs.extend((before as u64..).take(12));
             }
             Ok(())
         };
-        run(12, lead, |spins: &mut u32, job| {
+        let work = |spins: &mut u32, job| {
             *spins += 1;
             (0..10).for_each(|_| hint::spin_loop());
             [job as u32]
-        })?;
-        Ok(done)
+        };
+        run(12, lead, work).unwrap();
     }
 
-    /// Three long solves and a short one, each begun by `begin`; all end with the short one. How many jobs the long ones did.
-    fn beside_a_short_one(begin: impl Fn(&[&(dyn Fn() + Sync)])) -> [usize; 3] {
+    /// Three long solves and a short one, begun by `begin`; all end with the short one, which waits until the others have done `first`
+    /// jobs each. How many jobs the long ones did.
+    fn beside_a_short_one(first: usize, begin: impl Fn(&[&(dyn Fn() + Sync)])) -> [usize; 3] {
         let over = AtomicBool::new(false);
         let done = [const { AtomicUsize::new(0) }; 3];
-        let long = |i: usize| done[i].store(solve(MANY, &over).unwrap(), Relaxed);
+        let long = |i: usize| solve(MANY, &over, &done[i]);
         let short = || {
-            assert!(solve(FEW, &AtomicBool::new(false)).unwrap() >= FEW);
+            while done.iter().any(|jobs| jobs.load(Relaxed) < first) {
+                thread::yield_now();
+            }
+            solve(FEW, &AtomicBool::new(false), &AtomicUsize::new(0));
             over.store(true, Relaxed);
         };
         begin(&[&|| long(0), &|| long(1), &|| long(2), &short]);
@@ -420,7 +423,7 @@ mod tests {
                     solves.iter().for_each(|&solve| scope.spawn(move |_| solve()));
                 });
             };
-            let done = beside_a_short_one(in_pool);
+            let done = beside_a_short_one(0, in_pool);
             if threads == 1 {
                 assert!(done.iter().all(|&jobs| jobs <= TURN + 24), "{done:?}");
             }
@@ -435,7 +438,7 @@ mod tests {
                 solves.iter().for_each(|&solve| drop(scope.spawn(solve)));
             });
         };
-        let done = beside_a_short_one(outside);
+        let done = beside_a_short_one(10_000, outside);
         assert!(done.iter().all(|&jobs| jobs < MANY), "{done:?}");
     }
 
@@ -448,7 +451,7 @@ mod tests {
             });
         };
         for _ in 0..10 {
-            let done = beside_a_short_one(in_pool);
+            let done = beside_a_short_one(0, in_pool);
             assert!(done.iter().all(|&jobs| jobs < MANY), "{done:?}");
         }
     }
@@ -472,7 +475,11 @@ mod tests {
                 let (over, cancelled) = (&over, &cancelled);
                 scope.spawn(move |_| match i % 2 {
                     0 => assert!(matches!(cancelled(), Err(Error::Cancelled))),
-                    _ => assert!(solve(20 * FEW, over).unwrap() >= 20 * FEW),
+                    _ => {
+                        let done = AtomicUsize::new(0);
+                        solve(20 * FEW, over, &done);
+                        assert!(done.into_inner() >= 20 * FEW);
+                    }
                 });
             }
         });
