@@ -48,8 +48,8 @@ impl Delta {
             Self::Absolute(_) => number,
             Self::Auto(_) => {
                 let Measures { rms_curvature, extent, .. } = surface.measures();
-                let is_plane = rms_curvature * extent <= PLANE_BEND;
-                if is_plane { extent.recip() } else { number * rms_curvature }
+                let bends = rms_curvature * extent > PLANE_BEND;
+                if bends { number * rms_curvature } else { extent.recip() }
             }
         })
     }

@@ -151,7 +151,7 @@ impl Metric for Difference {
             Delta::Absolute(_) => number,
             Delta::Auto(_) => offset(surface, self.form, &changes, number),
         };
-        let tensors = tensors(surface, &changes, delta, control)?.into();
+        let tensors = tensors(surface, &changes, delta, control)?;
         let products: Vec<f64> = changes.par_iter().map(|change| change.gamma.det()).collect();
         let unit = match self.form {
             DifferenceForm::Rate => "",

@@ -145,7 +145,7 @@ pub struct Norm {
     form: Form,
     parameters: Vec<Parameter>,
     level: Option<f64>,
-    seed_ranks: Option<Arc<[f64]>>,
+    seed_ranks: Option<Arc<Vec<f64>>>,
 }
 
 #[derive(Clone)]
@@ -201,8 +201,8 @@ impl Norm {
     /// The same with a number for each node, row-major, that is least where the norm changes least: regions grow from there
     /// first. Without, they grow from where the Gaussian curvature is least.
     #[must_use]
-    pub fn with_seed_ranks(mut self, ranks: impl Into<Arc<[f64]>>) -> Self {
-        self.seed_ranks = Some(ranks.into());
+    pub fn with_seed_ranks(mut self, ranks: Vec<f64>) -> Self {
+        self.seed_ranks = Some(Arc::new(ranks));
         self
     }
 
@@ -239,7 +239,7 @@ impl Norm {
     /// See [`with_seed_ranks`](Self::with_seed_ranks).
     #[must_use]
     pub fn seed_ranks(&self) -> Option<&[f64]> {
-        self.seed_ranks.as_deref()
+        self.seed_ranks.as_ref().map(|ranks| &ranks[..])
     }
 }
 

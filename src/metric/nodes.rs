@@ -1,11 +1,12 @@
 //! What is known at the nodes only, and bilinear between them.
 
-use std::sync::Arc;
+use std::ops::Deref;
 
 use glam::DVec2;
 
 use super::{SpeedBlock, SpeedTensor};
 use crate::linalg::Sym2;
+use crate::linalg::bilinear::corner_weights;
 use crate::surface::{Block, Jet, JetBlock, Surface};
 
 /// The nodes of a surface as places in a row-major raster.
@@ -41,7 +42,7 @@ impl Nodes {
     /// The corners of the cell around grid coordinates as places in the raster, each with its bilinear weight. Beyond an
     /// edge that is not closed those of the nearest point of the grid.
     pub(super) fn corners(&self, at: DVec2) -> [(usize, f64); 4] {
-        let [[(west, w), (east, e)], [(north, n), (south, s)]] = [0, 1].map(|axis| {
+        let [(west, east, u), (north, south, v)] = [0, 1].map(|axis| {
             let (count, periodic) = (self.counts[axis], self.periodic[axis]);
             let last = (count - 1) as f64;
             let at = if periodic {
@@ -51,26 +52,26 @@ impl Nodes {
             };
             let first = at as usize;
             let next = if periodic { (first + 1) % count } else { (first + 1).min(count - 1) };
-            let share = at - first as f64;
-            [(first % count, 1.0 - share), (next, share)]
+            (first % count, next, at - first as f64)
         });
+        let [nw, ne, sw, se] = corner_weights(DVec2::new(u, v));
         [
-            (self.index(west, north), w * n),
-            (self.index(east, north), e * n),
-            (self.index(west, south), w * s),
-            (self.index(east, south), e * s),
+            (self.index(west, north), nw),
+            (self.index(east, north), ne),
+            (self.index(west, south), sw),
+            (self.index(east, south), se),
         ]
     }
 }
 
 /// Speed tensors at the nodes in the axes of the surface, bilinear between those that have one.
-pub(super) struct NodeTensors {
+pub(super) struct NodeTensors<T> {
     pub(super) nodes: Nodes,
     /// Row-major.
-    pub(super) tensors: Arc<[Sym2]>,
+    pub(super) tensors: T,
 }
 
-impl SpeedTensor for NodeTensors {
+impl<T: Deref<Target = [Sym2]> + Send + Sync> SpeedTensor for NodeTensors<T> {
     fn speed(&self, at: DVec2, _: &Jet) -> Sym2 {
         self.nodes
             .corners(at)
