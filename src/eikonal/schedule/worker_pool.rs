@@ -43,8 +43,9 @@ const TURN: usize = 2048;
 /// So many solves may be under way on one thread, each begun while the one before gave way. Each keeps its memory and some of the
 /// thread's stack.
 const MOST_NESTED: u32 = 8;
-/// Glances at what is waited for before others are let run on the core, and after that before a worker leaves.
+/// Glances at what is waited for after which other threads are let run on the core in between.
 const GLANCES: u32 = 1000;
+/// Glances after which a worker leaves.
 const PATIENCE: u32 = 1500;
 
 /// Alternates `lead`, which is given the jobs of a round and their outcomes and puts those of the next in their place, with `work`
