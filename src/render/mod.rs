@@ -3,8 +3,10 @@
 //! A [`SurfacePicture`] shows a surface in space. A map is laid out below its title in its true
 //! proportions on the ground, above the scale bar and the legend, which therefore never cover it.
 
+mod camera;
 mod canvas;
 mod colour;
+mod depth_buffer;
 mod field;
 mod gradient;
 mod isolines;
