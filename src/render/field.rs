@@ -4,7 +4,8 @@ use glam::DVec2;
 use image::RgbaImage;
 
 use super::gradient::Gradient;
-use super::layout::{Item, MapLayout, SIDE};
+use super::layout::{MapLayout, SIDE};
+use super::legend::Entry;
 use super::png::encode_png;
 use super::text::number;
 use crate::control::Control;
@@ -67,7 +68,7 @@ impl<'a> FieldPicture<'a> {
         let range = self.gradient.range(self.values);
         let mut legend = Vec::new();
         if let Some([low, high]) = range {
-            legend.push(Item::Bar {
+            legend.push(Entry::Bar {
                 colours: (0..SHADES)
                     .map(|i| self.gradient.colour(i as f64 / (SHADES - 1) as f64))
                     .collect(),
@@ -76,7 +77,7 @@ impl<'a> FieldPicture<'a> {
             });
         }
         if self.values.iter().any(|v| !v.is_finite()) {
-            legend.push(Item::Patch { colour: None, label: "no value".into() });
+            legend.push(Entry::Patch { colour: None, label: "no value".into() });
         }
         let mut layout = MapLayout::new(self.frame, &self.title, self.max_side_px, legend)?;
         layout.ground(&self.control, |grid| {

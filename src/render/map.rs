@@ -5,7 +5,8 @@ use image::RgbaImage;
 
 use super::colour::Rgb;
 use super::isolines::{IsolineLayer, draw_isolines, draw_labels};
-use super::layout::{Item, MapLayout, SIDE};
+use super::layout::{MapLayout, SIDE};
+use super::legend::Entry;
 use super::png::encode_png;
 use super::regions::RegionLayer;
 use super::relief::Relief;
@@ -121,7 +122,7 @@ impl<'a> MapPicture<'a> {
         if self.goals.len() == 1 { "G".into() } else { (goal + 1).to_string() }
     }
 
-    fn legend(&self) -> Vec<Item> {
+    fn legend(&self) -> Vec<Entry> {
         let mut items = Vec::new();
         let goal = if self.goals.len() > 1 { "first goal" } else { "goal" };
         for (places, mark, colour, label) in [
@@ -129,21 +130,21 @@ impl<'a> MapPicture<'a> {
             (&self.goals, self.goal_mark(0), Rgb::PURPLE, goal),
         ] {
             if !places.is_empty() {
-                items.push(Item::Pin { colour, mark, label: label.into() });
+                items.push(Entry::Pin { colour, mark, label: label.into() });
             }
         }
         let line = |colour, width, label: &String| {
-            (!label.is_empty()).then(|| Item::Line { colour, width, label: label.clone() })
+            (!label.is_empty()).then(|| Entry::Line { colour, width, label: label.clone() })
         };
         let routes = self.routes.iter().enumerate();
         items.extend(routes.filter_map(|(i, r)| line(r.colour, self.route_width(i), &r.label)));
         items.extend(self.isolines.iter().filter_map(|l| line(l.colour, 2.0, &l.label)));
         if self.barriers.iter().zip(self.heights).any(|(&barrier, h)| barrier && h.is_finite()) {
             let colour = Rgb(0xd8, 0xd2, 0xc0).mix(BARRIER, 0.5);
-            items.push(Item::Patch { colour: Some(colour), label: "barrier".into() });
+            items.push(Entry::Patch { colour: Some(colour), label: "barrier".into() });
         }
         if self.heights.iter().any(|h| !h.is_finite()) {
-            items.push(Item::Patch { colour: None, label: "no data".into() });
+            items.push(Entry::Patch { colour: None, label: "no data".into() });
         }
         items
     }

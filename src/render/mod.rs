@@ -11,6 +11,7 @@ mod field;
 mod gradient;
 mod isolines;
 mod layout;
+mod legend;
 mod map;
 mod palette;
 mod plot;
@@ -19,6 +20,7 @@ mod region_numbers;
 mod regions;
 mod relief;
 mod surface;
+mod symbol;
 mod text;
 
 pub use self::colour::Rgb;
