@@ -2,11 +2,11 @@
 
 mod args;
 mod commands;
+mod failure;
 mod output;
-mod places;
-mod plan;
 mod progress;
 mod report;
+mod scenario;
 
 use std::process::ExitCode;
 
@@ -15,9 +15,9 @@ use clap::Parser;
 fn main() -> ExitCode {
     match commands::run(&args::Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {}", report::explain(&error));
-            ExitCode::from(report::exit_code(&error))
+        Err(failure) => {
+            eprintln!("error: {}", failure.message);
+            ExitCode::from(failure.code)
         }
     }
 }

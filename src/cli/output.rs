@@ -4,11 +4,13 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use ridgeway::Error;
 use ridgeway::export::{
     Band, Samples, check_folder_free, check_free, write_file, write_folder, write_geotiff,
 };
 use ridgeway::terrain::Georeference;
-use ridgeway::{Error, Result};
+
+use crate::failure::{Failure, Result};
 
 /// The extension of an output in lower case, which picks its format, after checks that the file can
 /// be written once the work is done.
@@ -25,14 +27,14 @@ pub(crate) fn check_file(
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     let Some(extension) = extension.filter(|e| known.contains(&e.as_str())) else {
         let known: Vec<_> = known.iter().map(|e| format!(".{e}")).collect();
-        return Err(Error::usage(format!(
+        return Err(Failure::usage(format!(
             "{}: cannot tell the format from the name; end it in {}",
             path.display(),
             known.join(", ")
         )));
     };
     if input.is_some_and(|input| same_file(path, input)) {
-        return Err(Error::usage(format!(
+        return Err(Failure::usage(format!(
             "{}: is the DEM itself; choose another name for the output",
             path.display()
         )));
@@ -48,21 +50,21 @@ pub(crate) fn check_file(
 /// It is a file; one of the files exists and may not be replaced; the place is missing or not writable.
 pub(crate) fn check_outputs_in(path: &Path, names: &[&str], overwrite: bool) -> Result<()> {
     check_folder_free(path, names, overwrite)?;
-    check_writable(if path.is_dir() { path } else { folder_of(path) })
+    Ok(check_writable(if path.is_dir() { path } else { folder_of(path) })?)
 }
 
 /// Refuses to name one output twice.
 pub(crate) fn check_distinct(paths: &[&PathBuf]) -> Result<()> {
     for (i, path) in paths.iter().enumerate() {
         if paths[..i].contains(path) {
-            return Err(Error::usage(format!("{}: named twice as an output", path.display())));
+            return Err(Failure::usage(format!("{}: named twice as an output", path.display())));
         }
     }
     Ok(())
 }
 
 /// Checks that files can be made in a folder, by making one without a name.
-fn check_writable(folder: &Path) -> Result<()> {
+fn check_writable(folder: &Path) -> ridgeway::Result<()> {
     tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
 }
 
@@ -79,7 +81,7 @@ pub(crate) fn write_raster(
     overwrite: bool,
     georeference: &Georeference,
     bands: &[(String, Samples<'_>)],
-) -> Result<()> {
+) -> ridgeway::Result<()> {
     let bands: Vec<_> = bands
         .iter()
         .map(|(description, samples)| Band { description, samples: *samples })
@@ -92,7 +94,7 @@ pub(crate) fn write_raster(
 ///
 /// # Errors
 /// The disk's.
-pub(crate) fn write_content(path: &Path, overwrite: bool, content: &[u8]) -> Result<()> {
+pub(crate) fn write_content(path: &Path, overwrite: bool, content: &[u8]) -> ridgeway::Result<()> {
     write_file(path, overwrite, |out| out.write_all(content))
 }
 
@@ -105,7 +107,7 @@ pub(crate) fn write_contents(
     overwrite: bool,
     names: &[&str],
     contents: &[Vec<u8>],
-) -> Result<()> {
+) -> ridgeway::Result<()> {
     write_folder(folder, overwrite, |temporary| {
         names.iter().zip(contents).try_for_each(|(name, content)| {
             fs::write(temporary.join(name), content)

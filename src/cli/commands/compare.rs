@@ -2,15 +2,16 @@
 
 use ridgeway::export::routes_geojson;
 use ridgeway::metric::NamedMetric;
-use ridgeway::{Comparison, Control, Error, MetricField, Result, Route, Terrain};
-use serde_json::{Value, json};
+use ridgeway::plan::{ComparisonReport, Scenario};
+use ridgeway::{Comparison, Control, MetricField, Route, Terrain};
 
 use super::render;
 use super::route::{HEADER, measures, profiles};
 use crate::args::{CURVATURE, CompareArgs, RunArgs, known};
+use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
-use crate::plan::Journey;
-use crate::report::{Report, Table, wrote_in};
+use crate::report::{Report, Table, json, wrote_in};
+use crate::scenario::{self, command_line};
 
 const FILES: [&str; 4] = ["routes.geojson", "profile.csv", "summary.json", "map.png"];
 
@@ -23,35 +24,31 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
     }
     let metrics = metrics(args)?;
     let places = (&args.start.start[..], std::slice::from_ref(&args.goal));
-    let (journey, terrain) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
-    let [goal] = &journey.goals[..] else {
-        return Err(Error::usage(format!(
+    let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
+    if scenario.goals.len() != 1 {
+        return Err(Failure::usage(format!(
             "--goal {} holds {} points; compare takes one goal",
             args.goal,
-            journey.goals.len()
+            scenario.goals.len()
         )));
-    };
+    }
     let fields = metrics
         .into_iter()
-        .map(|metric| journey.field(metric, control))
+        .map(|metric| scenario::bind(&scenario, metric, &args.ground, run, control))
         .collect::<Result<Vec<_>>>()?;
-    let comparison = Comparison::between(
-        args.ground.metric.solver(),
-        &fields,
-        &journey.regions,
-        goal.at,
-        control,
-    )
-    .or_else(|error| journey.explain(error, &fields))?;
+    let comparison = scenario
+        .compare(&fields, control)
+        .map_err(|error| Failure::on_the_way(error, &scenario))?;
     let table = table(&fields, &comparison).to_string();
-    let summary = summary(&fields, &comparison, &journey);
+    let provenance = scenario.provenance(&fields, Some(command_line()));
+    let report = ComparisonReport::new(&fields, &comparison, provenance);
     if let Some(folder) = &args.output {
-        let contents = contents(args, &fields, &comparison, &summary, (&journey, &terrain))?;
+        let contents = contents((&scenario, &terrain), &fields, &comparison, &report, control)?;
         control.check()?;
         write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
     let written = args.output.iter().map(|folder| wrote_in(folder, &FILES));
-    Report { text: table + EXPLANATION + &written.collect::<String>(), json: summary }.print(run)
+    Report::new(table + EXPLANATION + &written.collect::<String>(), report).print(run)
 }
 
 const EXPLANATION: &str =
@@ -85,46 +82,21 @@ fn table(fields: &[MetricField<'_>], comparison: &Comparison) -> Table {
     table
 }
 
-fn summary(fields: &[MetricField<'_>], comparison: &Comparison, journey: &Journey<'_>) -> Value {
-    let routes: Vec<_> = fields
-        .iter()
-        .zip(&comparison.routes)
-        .enumerate()
-        .map(|(r, (field, route))| {
-            let costs: serde_json::Map<_, _> = fields
-                .iter()
-                .enumerate()
-                .map(|(m, under)| {
-                    let cost = json!({
-                        "cost": comparison.costs[m][r],
-                        "unit": under.unit(),
-                        "ratio_to_best": comparison.ratio(m, r),
-                    });
-                    (under.name().to_owned(), cost)
-                })
-                .collect();
-            json!({ "name": field.name(), "summary": route.summary, "costs": costs })
-        })
-        .collect();
-    json!({ "routes": routes, "provenance": journey.provenance(fields) })
-}
-
 /// The content of each of [`FILES`].
 fn contents(
-    args: &CompareArgs,
+    (scenario, terrain): (&Scenario, &Terrain),
     fields: &[MetricField<'_>],
     comparison: &Comparison,
-    summary: &Value,
-    (journey, terrain): (&Journey<'_>, &Terrain),
+    report: &ComparisonReport,
+    control: &Control,
 ) -> Result<[Vec<u8>; FILES.len()]> {
-    let named: Vec<(&str, &Route)> =
-        fields.iter().map(MetricField::name).zip(&comparison.routes).collect();
     let Comparison { routes, distances, .. } = comparison;
-    let geojson = routes_geojson(&named, journey.georeference.crs(), &journey.provenance(fields))?;
+    let named: Vec<(&str, &Route)> = fields.iter().map(MetricField::name).zip(routes).collect();
+    let geojson = routes_geojson(&named, scenario.georeference.crs(), &report.provenance)?;
     Ok([
         geojson.into_bytes(),
-        profiles(&named, journey)?,
-        format!("{summary:#}\n").into_bytes(),
-        render::map((journey, terrain), &args.dem, fields, routes, distances, PIXELS)?,
+        profiles(&named, scenario)?,
+        json(report).into_bytes(),
+        render::map((scenario, terrain), fields, routes, distances, PIXELS, control)?,
     ])
 }

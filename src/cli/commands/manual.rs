@@ -1,9 +1,10 @@
 //! `ridgeway completions` and `ridgeway man`.
 
 use clap::CommandFactory;
-use ridgeway::{Error, Result};
+use ridgeway::Error;
 
 use crate::args::Cli;
+use crate::failure::Result;
 use crate::report::print;
 
 pub(super) fn completions(shell: clap_complete::Shell) -> Result<()> {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::DVec2;
 use ridgeway::eikonal::TensorField;
+use ridgeway::plan::{MatchReport, MatchedSurface, Scenario};
 use ridgeway::region::{
     Level, Match, Neighbours, Signature, matches, matches_within, outlines, signatures,
 };
@@ -11,15 +12,15 @@ use ridgeway::render::{
     LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, encode_png, pair_colour,
 };
 use ridgeway::surface::{NurbsGrid, NurbsSurface};
-use ridgeway::{Control, Error, Modifiers, Result, Surface, Terrain};
-use serde_json::{Value, json};
+use ridgeway::{Control, Modifiers, Surface, Terrain};
 
 use super::render::title;
 use super::segment::cut;
 use crate::args::{CURVATURE, MatchArgs, RunArgs, known};
+use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
-use crate::plan::{Journey, command_line};
-use crate::report::{Report, Table, digits, metres, wrote_in};
+use crate::report::{Report, Table, digits, json, metres, wrote_in};
+use crate::scenario::{self, command_line};
 
 const FILES: [&str; 3] = ["matches.json", "regions.png", "signatures.png"];
 
@@ -41,35 +42,33 @@ pub(super) fn run(args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<
     let found = match &subjects[..] {
         [one] => matches_within(&one.signatures, args.sized)?,
         [first, second] => matches(&first.signatures, &second.signatures, args.sized)?,
-        _ => return Err(Error::usage("match compares one surface with itself, or two")),
+        _ => return Err(Failure::usage("match compares one surface with itself, or two")),
     };
-    let summary = summary(&subjects, &found);
+    let surfaces = subjects.iter().map(Subject::record).collect();
+    let report = MatchReport::new(surfaces, &found, Some(command_line()));
     if let Some(folder) = &args.output {
         let colours = colours(&subjects, &found);
-        let contents = [
-            format!("{summary:#}\n").into_bytes(),
-            regions(&subjects, &colours)?,
-            plot(&subjects, &colours)?,
-        ];
+        let contents =
+            [json(&report).into_bytes(), regions(&subjects, &colours)?, plot(&subjects, &colours)?];
         control.check()?;
         write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
     let written = args.output.iter().map(|folder| wrote_in(folder, &FILES));
     let text = table(&subjects, &found) + &written.collect::<String>();
-    Report { text, json: summary }.print(run)
+    Report::new(text, report).print(run)
 }
 
 /// A surface cut into regions.
 struct Subject<'a> {
     path: &'a Path,
-    ground: Ground<'a>,
+    ground: Ground,
     /// The finest level.
     level: Level,
     signatures: Vec<Signature>,
 }
 
-enum Ground<'a> {
-    Heights(Box<Journey<'a>>, Box<Terrain>),
+enum Ground {
+    Heights(Box<Scenario>, Box<Terrain>),
     Nurbs(Box<NurbsGrid>),
 }
 
@@ -78,17 +77,12 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// A file that cannot be read or used; a flag that a NURBS surface cannot have.
-    fn open(
-        path: &'a Path,
-        args: &'a MatchArgs,
-        run: &RunArgs,
-        control: &'a Control,
-    ) -> Result<Self> {
+    fn open(path: &'a Path, args: &'a MatchArgs, run: &RunArgs, control: &Control) -> Result<Self> {
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let (ground, ranks, field) = if is_json {
             if let Some(flag) = args.ground.metric.of_dems() {
                 let name = path.display();
-                return Err(Error::usage(format!("{flag} is for DEMs, and {name} is none")));
+                return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
             }
             let (cols, rows) = args.nodes;
             let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
@@ -100,12 +94,12 @@ impl<'a> Subject<'a> {
             (Ground::Nurbs(Box::new(surface)), ranks, field)
         } else {
             let name = args.ground.metric.chosen(args.metric)?;
-            let (journey, terrain) =
-                Journey::prepare(path, (&[], &[]), &args.ground, run, control)?;
-            let metric = journey.field(name, control)?;
+            let places = (&[][..], &[][..]);
+            let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
+            let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
             let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
             drop(metric);
-            (Ground::Heights(Box::new(journey), Box::new(terrain)), ranks, field)
+            (Ground::Heights(Box::new(scenario), Box::new(terrain)), ranks, field)
         };
         let surface = ground.surface();
         let (regions, solver) = (&args.regions, args.ground.metric.solver());
@@ -113,6 +107,11 @@ impl<'a> Subject<'a> {
         let level = levels.pop().unwrap_or_default();
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
         Ok(Self { path, ground, level, signatures })
+    }
+
+    fn record(&self) -> MatchedSurface {
+        let signatures = self.signatures.iter().enumerate();
+        MatchedSurface::new(self.path, signatures.map(|(i, &signature)| (self.seed(i), signature)))
     }
 
     /// The seed of a region: map coordinates on a DEM, else the point in space.
@@ -126,10 +125,10 @@ impl<'a> Subject<'a> {
     }
 }
 
-impl Ground<'_> {
+impl Ground {
     fn surface(&self) -> &dyn Surface {
         match self {
-            Self::Heights(journey, _) => &journey.surface,
+            Self::Heights(scenario, _) => &scenario.surface,
             Self::Nurbs(surface) => &**surface,
         }
     }
@@ -152,7 +151,7 @@ fn colours(subjects: &[Subject<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
 }
 
 /// The surfaces side by side.
-fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
+fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
     let picture = |(subject, colours): (&Subject<'_>, &Vec<Rgb>)| match &subject.ground {
         Ground::Heights(_, terrain) => {
             let outlines = outlines(&subject.level, terrain.frame().cols());
@@ -176,11 +175,13 @@ fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
             picture.render()
         }
     };
-    encode_png(&beside(&subjects.iter().zip(colours).map(picture).collect::<Result<Vec<_>>>()?)?)
+    encode_png(&beside(
+        &subjects.iter().zip(colours).map(picture).collect::<ridgeway::Result<Vec<_>>>()?,
+    )?)
 }
 
 /// The two largest eigenvalues of all regions.
-fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> Result<Vec<u8>> {
+fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
     let mut plot = LogPlot {
         kinds: subjects.iter().map(|subject| title(subject.path)).collect(),
         axes: ["λ1".into(), "λ2".into()],
@@ -233,33 +234,4 @@ fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
         text += &format!("and {} pairs less alike\n", found.len() - NAMED);
     }
     text
-}
-
-fn summary(subjects: &[Subject<'_>], found: &[Match]) -> Value {
-    let surface = |subject: &Subject<'_>| {
-        let regions = subject.signatures.iter().enumerate().map(|(i, signature)| {
-            json!({
-                "region": i + 1,
-                "seed": subject.seed(i),
-                "size_m": signature.size,
-                "signature": signature.eigenvalues,
-            })
-        });
-        json!({ "file": title(subject.path), "regions": regions.collect::<Vec<_>>() })
-    };
-    let pair = |pair: &Match| {
-        json!({
-            "first": pair.first + 1,
-            "second": pair.second + 1,
-            "unlikeness": pair.distance,
-            "size_ratio": pair.size_ratio,
-            "mutual": pair.mutual,
-        })
-    };
-    json!({
-        "surfaces": subjects.iter().map(surface).collect::<Vec<_>>(),
-        "matches": found.iter().map(pair).collect::<Vec<_>>(),
-        "software": format!("ridgeway {}", env!("CARGO_PKG_VERSION")),
-        "command": command_line(),
-    })
 }

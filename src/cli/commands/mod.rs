@@ -11,9 +11,8 @@ mod segment;
 mod surface;
 mod synth;
 
-use ridgeway::{Error, Result};
-
 use crate::args::{Cli, Command};
+use crate::failure::{Failure, Result};
 use crate::progress;
 
 /// Runs what the user asked for.
@@ -22,7 +21,7 @@ pub(crate) fn run(cli: &Cli) -> Result<()> {
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads.into())
             .build_global()
-            .map_err(|error| Error::usage(format!("--threads {threads}: {error}")))?;
+            .map_err(|error| Failure::usage(format!("--threads {threads}: {error}")))?;
     }
     let control = progress::control(&cli.run);
     let run = &cli.run;

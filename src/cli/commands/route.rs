@@ -1,16 +1,14 @@
 //! `ridgeway route`: a route from the start to each goal.
 
-use rayon::prelude::*;
 use ridgeway::export::{routes_geojson, routes_gpx, write_profiles};
-use ridgeway::route::trace;
-use ridgeway::{Control, Error, Result, Route};
-use serde_json::{Value, json};
+use ridgeway::plan::{Provenance, RouteReport, Scenario};
+use ridgeway::{Control, Error, Route};
 
 use crate::args::{RouteArgs, RunArgs};
+use crate::failure::{Failure, Result};
 use crate::output::{check_distinct, check_file, write_content};
-use crate::places::Spot;
-use crate::plan::Journey;
 use crate::report::{Report, Table, distance, metres, wrote};
+use crate::scenario::{self, command_line};
 
 pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<()> {
     check_distinct(&args.output.iter().collect::<Vec<_>>())?;
@@ -23,57 +21,49 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
         .collect::<Result<Vec<_>>>()?;
     let name = args.ground.metric.chosen(args.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
-    let (journey, _) = Journey::prepare(&args.dem, places, &args.ground, run, control)?;
-    let field = journey.field(name, control)?;
-    let map = journey.solve(&field, &journey.all_goals())?;
-    let to_goal = |goal: &Spot| {
-        control.check()?;
-        Ok((format!("to {}", goal.name), trace(&map, &field, goal.at)?))
-    };
-    let routes = journey.goals.par_iter().map(to_goal).collect::<Result<Vec<_>>>()?;
+    let (scenario, _) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
+    let field = scenario::bind(&scenario, name, &args.ground, run, control)?;
+    let routes =
+        scenario.routes(&field, control).map_err(|error| Failure::on_the_way(error, &scenario))?;
     control.check()?;
-    let named: Vec<_> = routes.iter().map(|(name, route)| (name.as_str(), route)).collect();
-    let provenance = journey.provenance(std::slice::from_ref(&field));
+    let names: Vec<_> = scenario.goals.iter().map(|goal| format!("to {}", goal.name)).collect();
+    let named: Vec<_> = names.iter().map(String::as_str).zip(&routes).collect();
+    let provenance = scenario.provenance(std::slice::from_ref(&field), Some(command_line()));
     // All contents are made before the first file is written.
     let contents = formats
         .iter()
-        .map(|format| content(format, &journey, &named, &provenance))
+        .map(|format| content(format, &scenario, &named, &provenance))
         .collect::<Result<Vec<_>>>()?;
     for (path, content) in args.output.iter().zip(&contents) {
         write_content(path, args.overwrite, content)?;
     }
     let written: String = args.output.iter().map(|path| wrote(path)).collect();
-    let routes: Vec<_> = named
-        .iter()
-        .map(|(name, route)| json!({ "name": name, "summary": route.summary }))
-        .collect();
-    Report {
-        text: table(&named).to_string() + &written,
-        json: json!({ "routes": routes, "provenance": provenance }),
-    }
-    .print(run)
+    let text = table(&named).to_string() + &written;
+    Report::new(text, RouteReport::new(&named, provenance)).print(run)
 }
 
 /// The file of a format.
 fn content(
     format: &str,
-    journey: &Journey<'_>,
+    scenario: &Scenario,
     routes: &[(&str, &Route)],
-    provenance: &Value,
+    provenance: &Provenance,
 ) -> Result<Vec<u8>> {
-    let crs = journey.georeference.crs();
+    let crs = scenario.georeference.crs();
     Ok(match format {
         "gpx" => routes_gpx(routes, crs)?.into_bytes(),
-        "csv" => profiles(routes, journey)?,
+        "csv" => profiles(routes, scenario)?,
         _ => routes_geojson(routes, crs, provenance)?.into_bytes(),
     })
 }
 
 /// The profiles of routes at a step of one cell, as CSV.
-pub(super) fn profiles(routes: &[(&str, &Route)], journey: &Journey<'_>) -> Result<Vec<u8>> {
-    let step = journey.georeference.frame().mid_spacing().min_element();
-    let profiles: Vec<_> =
-        routes.iter().map(|(name, route)| (*name, route.profile(&journey.surface, step))).collect();
+pub(super) fn profiles(routes: &[(&str, &Route)], scenario: &Scenario) -> Result<Vec<u8>> {
+    let step = scenario.frame().mid_spacing().min_element();
+    let profiles: Vec<_> = routes
+        .iter()
+        .map(|(name, route)| (*name, route.profile(&scenario.surface, step)))
+        .collect();
     let mut csv = Vec::new();
     write_profiles(&mut csv, &profiles).map_err(|source| Error::io("profile", source))?;
     Ok(csv)

@@ -1,21 +1,22 @@
 //! `ridgeway segment`: regions of like shape.
 
 use geo_types::MultiPolygon;
+use glam::DVec2;
 use ridgeway::eikonal::TensorField;
 use ridgeway::export::{Samples, regions_geojson};
+use ridgeway::plan::{Provenance, RegionRecord, Scenario, SegmentReport, coordinate};
 use ridgeway::region::{
     Level, Neighbours, RegionStatistics, Segmentation, Signature, outlines, signatures, statistics,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
-use ridgeway::{Control, HeightSurface, MetricField, Result, Solver, Surface, Terrain};
-use serde_json::{Map, Value, json};
+use ridgeway::{Control, HeightSurface, MetricField, Solver, Surface, Terrain};
 
 use super::render::title;
 use crate::args::{RegionArgs, RunArgs, SegmentArgs};
+use crate::failure::Result;
 use crate::output::{check_distinct, check_file, write_content, write_raster};
-use crate::plan::Journey;
-use crate::report::{Facts, Report, Table, coordinate, digits, distance, wrote};
-use glam::DVec2;
+use crate::report::{Facts, Report, Table, digits, distance, wrote};
+use crate::scenario::{self, command_line};
 
 /// Most regions of a level that the table names.
 const NAMED: usize = 20;
@@ -29,17 +30,18 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
         .collect::<Result<Vec<_>>>()?;
     let name = args.ground.metric.chosen(args.metric)?;
-    let (journey, terrain) = Journey::prepare(&args.dem, (&[], &[]), &args.ground, run, control)?;
+    let places = (&[][..], &[][..]);
+    let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let relief = formats.iter().any(|format| format == "png").then_some(terrain);
-    let metric = journey.field(name, control)?;
+    let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
     let field = TensorField::sample(&metric, control)?;
     let ranks = metric.seed_ranks();
     let (regions, solver) = (&args.regions, args.ground.metric.solver());
-    let segmentation = cut(&journey.surface, field, ranks, regions, solver, control)?;
-    let measures = measures(&segmentation, &journey.surface, control)?;
-    let outcome = Outcome { journey: &journey, metric: &metric, segmentation, measures };
+    let segmentation = cut(&scenario.surface, field, ranks, regions, solver, control)?;
+    let measures = measures(&segmentation, &scenario.surface, control)?;
+    let outcome = Regions { scenario: &scenario, metric: &metric, segmentation, measures };
     control.check()?;
-    let provenance = journey.provenance(std::slice::from_ref(&metric));
+    let provenance = scenario.provenance(std::slice::from_ref(&metric), Some(command_line()));
     for (path, format) in args.output.iter().zip(&formats) {
         match (format.as_str(), &relief) {
             ("png", Some(terrain)) => {
@@ -51,16 +53,14 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         }
     }
     let written: String = args.output.iter().map(|path| wrote(path)).collect();
-    let regions: Vec<_> =
-        outcome.named().map(|(_, properties)| Value::Object(properties)).collect();
-    let json = json!({
-        "metric": metric.name(),
-        "unit": metric.unit(),
-        "delta_per_m": metric.parameter("delta_per_m"),
-        "regions": regions,
-        "provenance": provenance,
-    });
-    Report { text: outcome.text() + &written, json }.print(run)
+    let report = SegmentReport {
+        metric: metric.name().to_owned(),
+        unit: metric.unit(),
+        delta_per_m: metric.parameter("delta_per_m"),
+        regions: outcome.records().collect(),
+        provenance,
+    };
+    Report::new(outcome.text() + &written, report).print(run)
 }
 
 /// Cuts a surface, on which `field` is the metric, by seeds in the order of their `ranks`, as the flags ask.
@@ -74,7 +74,7 @@ pub(super) fn cut(
     regions: &RegionArgs,
     solver: Solver,
     control: &Control,
-) -> Result<Segmentation> {
+) -> ridgeway::Result<Segmentation> {
     let mut segmentation = Segmentation::of(&field, &ranks, &regions.options(solver), control)?;
     drop((field, ranks));
     if let Some(tolerance) = regions.merge {
@@ -88,7 +88,7 @@ fn measures(
     segmentation: &Segmentation,
     surface: &HeightSurface,
     control: &Control,
-) -> Result<Vec<Vec<(RegionStatistics, Signature)>>> {
+) -> ridgeway::Result<Vec<Vec<(RegionStatistics, Signature)>>> {
     let of_level = |level: &Level| {
         control.report("measuring", 0.0);
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
@@ -98,37 +98,24 @@ fn measures(
 }
 
 /// Regions and what is known of them.
-struct Outcome<'a> {
-    journey: &'a Journey<'a>,
+struct Regions<'a> {
+    scenario: &'a Scenario,
     metric: &'a MetricField<'a>,
     segmentation: Segmentation,
     measures: Vec<Vec<(RegionStatistics, Signature)>>,
 }
 
-impl Outcome<'_> {
-    /// Level and properties of each region, in order.
-    fn named(&self) -> impl Iterator<Item = (usize, Map<String, Value>)> + '_ {
-        self.segmentation.levels.iter().zip(&self.measures).enumerate().flat_map(
-            move |(depth, (level, measures))| {
-                let named = level.regions.iter().zip(measures).enumerate();
-                named.map(move |(i, (region, (statistics, signature)))| {
-                    let seed = self.journey.georeference.frame().to_map(node(region.seed));
-                    let mut properties = Map::new();
-                    let mut add = |name: &str, value: Value| properties.insert(name.into(), value);
-                    add("level", (depth + 1).into());
-                    add("region", (i + 1).into());
-                    add("parent", region.parent.map(|parent| parent + 1).into());
-                    add("epsilon", region.epsilon.into());
-                    add("epsilon_unit", self.metric.unit().symbol().into());
-                    add("seed", json!(seed.to_array()));
-                    add("signature", json!(signature.eigenvalues));
-                    if let Ok(Value::Object(statistics)) = serde_json::to_value(statistics) {
-                        properties.extend(statistics);
-                    }
-                    (depth, properties)
-                })
-            },
-        )
+impl Regions<'_> {
+    /// The regions of each level in order.
+    fn records(&self) -> impl Iterator<Item = RegionRecord> + '_ {
+        let levels = self.segmentation.levels.iter().zip(&self.measures).enumerate();
+        levels.flat_map(move |(depth, (level, measures))| {
+            let regions = level.regions.iter().zip(measures).enumerate();
+            regions.map(move |(i, (region, measures))| {
+                let seed = self.scenario.frame().to_map(node(region.seed)).to_array();
+                RegionRecord::new([depth, i], region, seed, measures, self.metric.unit())
+            })
+        })
     }
 
     fn outlines(&self) -> Vec<Vec<MultiPolygon<f64>>> {
@@ -136,11 +123,9 @@ impl Outcome<'_> {
         levels.map(|level| outlines(level, self.segmentation.cols)).collect()
     }
 
-    fn polygons(&self, provenance: &Value) -> Result<Vec<u8>> {
-        let polygons = self.outlines().into_iter().flatten();
-        let regions: Vec<_> =
-            self.named().zip(polygons).map(|((_, named), polygons)| (named, polygons)).collect();
-        let on = &self.journey.georeference;
+    fn polygons(&self, provenance: &Provenance) -> Result<Vec<u8>> {
+        let regions: Vec<_> = self.records().zip(self.outlines().into_iter().flatten()).collect();
+        let on = &self.scenario.georeference;
         Ok(regions_geojson(&regions, on.frame(), on.crs(), provenance)?.into_bytes())
     }
 
@@ -151,7 +136,7 @@ impl Outcome<'_> {
         let name = |depth: usize| format!("region of level {}", depth + 1);
         let bands: Vec<_> =
             numbers.iter().enumerate().map(|(i, n)| (name(i), Samples::U32(n))).collect();
-        write_raster(path, overwrite, &self.journey.georeference, &bands)
+        Ok(write_raster(path, overwrite, &self.scenario.georeference, &bands)?)
     }
 
     fn picture(&self, terrain: &Terrain, title: String) -> Result<Vec<u8>> {
@@ -167,7 +152,7 @@ impl Outcome<'_> {
                 seeds: finest.regions.iter().map(|region| node(region.seed)).collect(),
             });
         }
-        map.png()
+        Ok(map.png()?)
     }
 
     fn text(&self) -> String {
@@ -208,11 +193,11 @@ impl Outcome<'_> {
         order.sort_by(|&a, &b| measures[b].0.area_m2.total_cmp(&measures[a].0.area_m2));
         let mut table = Table::default();
         table.row(["region", "of", "cells", "area", "slope", "|κ1|, 1/m", "|κ2|, 1/m", "seed"]);
-        let cell = self.journey.georeference.frame().step().min_element();
+        let cell = self.scenario.frame().step().min_element();
         for &i in order.iter().take(NAMED) {
             let (region, m) = (&level.regions[i], &measures[i].0);
             let [larger, smaller] = m.mean_abs_curvature_per_m.map(digits);
-            let seed = self.journey.georeference.frame().to_map(node(region.seed));
+            let seed = self.scenario.frame().to_map(node(region.seed));
             let [x, y] = seed.to_array().map(|value| coordinate(value, cell));
             table.row([
                 (i + 1).to_string(),

@@ -2,20 +2,22 @@
 
 use rayon::prelude::*;
 use ridgeway::export::Samples;
-use ridgeway::{Control, HeightJet, HeightSurface, Result};
+use ridgeway::plan::{coordinate, describe_fit};
+use ridgeway::{Control, HeightJet, HeightSurface};
 use serde_json::json;
 
 use crate::args::{Layer, RunArgs, SurfaceArgs};
+use crate::failure::Result;
 use crate::output::{check_file, write_raster};
-use crate::plan;
-use crate::report::{Facts, Report, coordinate, digits, wrote};
+use crate::report::{Facts, Report, digits, wrote};
+use crate::scenario;
 
 pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Result<()> {
     if let Some(output) = &args.output {
         check_file(output, &["tif", "tiff"], args.overwrite, Some(&args.dem))?;
     }
-    let terrain = plan::open(&args.dem, run)?;
-    let surface = plan::fit(&args.dem, &terrain, &args.fit, control)?;
+    let terrain = scenario::open(&args.dem, run)?;
+    let surface = scenario::fit(&args.dem, &terrain, &args.fit, control)?;
     if let Some(output) = &args.output {
         let make = |layer: Layer| {
             let surface = &surface;
@@ -37,24 +39,26 @@ fn report(args: &SurfaceArgs, surface: &HeightSurface) -> Report {
     let at = surface.frame().to_map(residuals.at);
     let cell = surface.frame().step().min_element();
     let [x, y] = at.to_array().map(|value| coordinate(value, cell));
-    let fit = plan::describe_fit(&args.fit, surface);
+    let fit = describe_fit(&args.fit.options(), surface);
     let mut facts = Facts::default();
     facts.add("surface", fit.as_str());
     facts.add("residuals", format!("{} m root mean square", digits(residuals.rms)));
     facts.add("largest", format!("{} m at {x},{y}", digits(residuals.max)));
     facts.add("curvature", format!("{} 1/m root mean square", digits(surface.rms_curvature())));
-    Report {
-        text: facts.to_string() + &args.output.iter().map(|path| wrote(path)).collect::<String>(),
-        json: json!({
+    let outputs: Vec<_> = args.output.iter().map(|path| path.display().to_string()).collect();
+    let written: String = args.output.iter().map(|path| wrote(path)).collect();
+    Report::new(
+        facts.to_string() + &written,
+        json!({
             "surface": fit,
             "cutoff_m": surface.cutoff(),
             "rms_residual_m": residuals.rms,
             "max_residual_m": residuals.max,
             "max_residual_at": at.to_array(),
             "rms_curvature_per_m": surface.rms_curvature(),
-            "outputs": args.output.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
+            "outputs": outputs,
         }),
-    }
+    )
 }
 
 impl Layer {

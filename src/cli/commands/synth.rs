@@ -2,10 +2,11 @@
 
 use ridgeway::export::Samples;
 use ridgeway::synthetic::{Synthetic, SyntheticKind};
-use ridgeway::{Control, Crs, Result, Terrain};
+use ridgeway::{Control, Crs, Terrain};
 use serde_json::json;
 
 use crate::args::{RunArgs, SynthArgs};
+use crate::failure::Result;
 use crate::output::{check_file, write_raster};
 use crate::report::{Facts, Report, wrote};
 
@@ -25,19 +26,16 @@ pub(super) fn run(args: &SynthArgs, run: &RunArgs, control: &Control) -> Result<
     };
     let bands = [("height (m)".into(), Samples::F32Rows(&heights))];
     write_raster(output, args.overwrite, terrain.georeference(), &bands)?;
-    Report {
-        text: wrote(output),
-        json: json!({
-            "kind": kind.name(),
-            "columns": frame.cols(),
-            "rows": frame.rows(),
-            "spacing_m": args.spacing,
-            "seed": args.seed,
-            "crs": terrain.crs().name(),
-            "outputs": [output.display().to_string()],
-        }),
-    }
-    .print(run)
+    let facts = json!({
+        "kind": kind.name(),
+        "columns": frame.cols(),
+        "rows": frame.rows(),
+        "spacing_m": args.spacing,
+        "seed": args.seed,
+        "crs": terrain.crs().name(),
+        "outputs": [output.display().to_string()],
+    });
+    Report::new(wrote(output), facts).print(run)
 }
 
 fn terrain(args: &SynthArgs, kind: SyntheticKind, control: &Control) -> Result<Terrain> {
@@ -49,7 +47,7 @@ fn terrain(args: &SynthArgs, kind: SyntheticKind, control: &Control) -> Result<T
     let crs = args.crs.map_or_else(|| Ok(Crs::none()), Crs::from_epsg)?;
     let metres = crs.ground().metres_per_unit(args.origin.y);
     let to_centre = synthetic.position(cols - 1, 0) / metres;
-    synthetic.terrain_under(crs, args.origin + to_centre, control)
+    Ok(synthetic.terrain_under(crs, args.origin + to_centre, control)?)
 }
 
 fn list(run: &RunArgs) -> Result<()> {
@@ -59,5 +57,5 @@ fn list(run: &RunArgs) -> Result<()> {
     }
     let kinds =
         SyntheticKind::ALL.map(|k| json!({ "name": k.name(), "description": k.description() }));
-    Report { text: facts.to_string(), json: json!(kinds) }.print_always(run)
+    Report::new(facts.to_string(), kinds).print_always(run)
 }

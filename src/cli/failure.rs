@@ -1,0 +1,108 @@
+//! Why a command fails, in the words of the command, and its exit code.
+
+use std::io::ErrorKind;
+
+use ridgeway::Error;
+use ridgeway::error::{BadPlace, Location, Obstacle, Trouble};
+use ridgeway::plan::Scenario;
+
+/// `Result` of a command.
+pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
+
+/// A sentence for people and an exit code for scripts.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    pub(crate) message: String,
+    pub(crate) code: u8,
+}
+
+const NO_PATH: u8 = 1;
+const WRONG_USE: u8 = 2;
+const READING_OR_WRITING: u8 = 3;
+const CANCELLED: u8 = 130;
+
+impl Failure {
+    /// The command was used wrongly.
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self { message: message.into(), code: WRONG_USE }
+    }
+
+    /// An error on the way to the goals of a scenario, which are named as the user wrote them.
+    pub(crate) fn on_the_way(error: Error, scenario: &Scenario) -> Self {
+        let Error::NoPath { goal: Location::Grid(at), nearest, .. } = error else {
+            return error.into();
+        };
+        let Some(goal) = scenario.goals.iter().find(|goal| goal.at == at) else {
+            return error.into();
+        };
+        let near = match nearest {
+            Some(Location::Grid(near)) => goal.notation.write(near, &scenario.georeference).ok(),
+            _ => None,
+        };
+        let advice = near.map(|near| format!("; the nearest good place is {near}"));
+        let message = format!(
+            "--goal {} cannot be reached from the start: voids, barriers or too steep ground lie between{}",
+            goal.name,
+            advice.unwrap_or_default()
+        );
+        Self { message, code: NO_PATH }
+    }
+}
+
+impl From<Error> for Failure {
+    /// What the library says, and what to do about it here.
+    fn from(error: Error) -> Self {
+        let (code, advice) = match &error {
+            Error::NoPath { .. } => (NO_PATH, ""),
+            Error::Cancelled => (CANCELLED, "; nothing was written"),
+            // A file in the way is a wrong use, not a fault of the disk.
+            Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
+                (WRONG_USE, "; give --overwrite to replace it")
+            }
+            Error::Io { source, .. } => (READING_OR_WRITING, advice(source.kind())),
+            Error::Place(place) => return Self::usage(refusal(place)),
+            _ => (WRONG_USE, ""),
+        };
+        Self { message: format!("{error}{advice}"), code }
+    }
+}
+
+fn advice(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::NotFound => "; check its name and the folder you are in",
+        ErrorKind::IsADirectory => "; name a file",
+        ErrorKind::PermissionDenied => "; check who may read and write it",
+        _ => "",
+    }
+}
+
+/// Why the place that was given to a flag cannot be used.
+fn refusal(place: &BadPlace) -> String {
+    let BadPlace { role, name, trouble, nearest } = place;
+    match trouble {
+        Trouble::NotPoints => {
+            format!("--{role} takes points; its file also holds lines or areas")
+        }
+        Trouble::OffGround => format!(
+            "--{role}: its lines and areas touch no open cell of the DEM; the file must be in longitude and \
+             latitude (RFC 7946) and overlap the DEM"
+        ),
+        Trouble::Closed(by) if !by.is_empty() => {
+            let reasons: Vec<_> = by.iter().map(flag_that_closes).collect();
+            let advice = match nearest {
+                Some(near) => format!("; the nearest good place is {near}"),
+                None => ", and so does every other cell".to_owned(),
+            };
+            format!("--{role} {name} lies {}{advice}", reasons.join(" and "))
+        }
+        _ => format!("--{role} {name} {}", place.account()),
+    }
+}
+
+fn flag_that_closes(obstacle: &Obstacle) -> String {
+    match obstacle {
+        Obstacle::Slope => "on ground steeper than --max-slope allows".into(),
+        Obstacle::NoValue => "where --cost or --tensor has no value".into(),
+        other => format!("on {other}"),
+    }
+}
