@@ -45,7 +45,7 @@ pub enum Error {
     Argument(Box<Mismatch>),
     /// A start or a goal cannot be used.
     #[error("{0}")]
-    Place(Box<BadPlace>),
+    Place(Box<PlaceError>),
     /// No path leads from the start to the goal.
     #[error(
         "no path leads from the start to the goal at {goal}{}{}",
@@ -120,13 +120,13 @@ pub struct Mismatch {
 
 /// A start or a goal that cannot be used.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BadPlace {
+pub struct PlaceError {
     /// What the place is for.
     pub role: Role,
     /// The place as it was given, such as `pixel:3,4`.
     pub name: String,
     /// What is wrong with it.
-    pub trouble: Trouble,
+    pub kind: PlaceErrorKind,
     /// The nearest place that would do, written in the same way; `None` if there is none, or it makes no sense to look for one.
     pub nearest: Option<String>,
 }
@@ -143,7 +143,7 @@ pub enum Role {
 /// What is wrong with a place.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Trouble {
+pub enum PlaceErrorKind {
     /// It lies outside the DEM.
     Outside {
         /// The first corner of the DEM: south-west, or of pixels north-west.
@@ -342,26 +342,28 @@ impl fmt::Display for Mismatch {
     }
 }
 
-impl BadPlace {
+impl PlaceError {
     /// What is wrong with the place, and where a better one is: the predicate of a sentence about it.
     #[must_use]
-    pub fn account(&self) -> String {
-        let Self { trouble, nearest, .. } = self;
-        let advice = match (trouble, nearest) {
-            (Trouble::NotPoints | Trouble::OffGround, _)
-            | (Trouble::Outside { swapped: Some(_), .. }, _)
-            | (Trouble::Outside { .. }, None) => String::new(),
-            (Trouble::Outside { .. }, Some(near)) => format!("; the nearest place on it is {near}"),
+    pub fn reason(&self) -> String {
+        let Self { kind, nearest, .. } = self;
+        let advice = match (kind, nearest) {
+            (PlaceErrorKind::NotPoints | PlaceErrorKind::OffGround, _)
+            | (PlaceErrorKind::Outside { swapped: Some(_), .. }, _)
+            | (PlaceErrorKind::Outside { .. }, None) => String::new(),
+            (PlaceErrorKind::Outside { .. }, Some(near)) => {
+                format!("; the nearest place on it is {near}")
+            }
             (_, Some(near)) => format!("; the nearest good place is {near}"),
             (_, None) => ", and so does every other cell".to_owned(),
         };
-        format!("{trouble}{advice}")
+        format!("{kind}{advice}")
     }
 }
 
-impl fmt::Display for BadPlace {
+impl fmt::Display for PlaceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the {} {} {}", self.role, self.name, self.account())
+        write!(f, "the {} {} {}", self.role, self.name, self.reason())
     }
 }
 
@@ -374,7 +376,7 @@ impl fmt::Display for Role {
     }
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for PlaceErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Outside { from, to, swapped } => {

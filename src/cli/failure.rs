@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 
 use ridgeway::Error;
-use ridgeway::error::{BadPlace, Location, Obstacle, Trouble};
+use ridgeway::error::{Location, Obstacle, PlaceError, PlaceErrorKind};
 use ridgeway::plan::Scenario;
 
 /// `Result` of a command.
@@ -77,17 +77,17 @@ fn advice(kind: ErrorKind) -> &'static str {
 }
 
 /// Why the place that was given to a flag cannot be used.
-fn refusal(place: &BadPlace) -> String {
-    let BadPlace { role, name, trouble, nearest } = place;
-    match trouble {
-        Trouble::NotPoints => {
+fn refusal(place: &PlaceError) -> String {
+    let PlaceError { role, name, kind, nearest } = place;
+    match kind {
+        PlaceErrorKind::NotPoints => {
             format!("--{role} takes points; its file also holds lines or areas")
         }
-        Trouble::OffGround => format!(
+        PlaceErrorKind::OffGround => format!(
             "--{role}: its lines and areas touch no open cell of the DEM; the file must be in longitude and \
              latitude (RFC 7946) and overlap the DEM"
         ),
-        Trouble::Closed(by) if !by.is_empty() => {
+        PlaceErrorKind::Closed(by) if !by.is_empty() => {
             let reasons: Vec<_> = by.iter().map(flag_that_closes).collect();
             let advice = match nearest {
                 Some(near) => format!("; the nearest good place is {near}"),
@@ -95,7 +95,7 @@ fn refusal(place: &BadPlace) -> String {
             };
             format!("--{role} {name} lies {}{advice}", reasons.join(" and "))
         }
-        _ => format!("--{role} {name} {}", place.account()),
+        _ => format!("--{role} {name} {}", place.reason()),
     }
 }
 

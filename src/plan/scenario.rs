@@ -12,7 +12,7 @@ use super::rasters::{read_costs, read_tensors};
 use super::site::{Site, locate, nearest};
 use crate::control::Control;
 use crate::eikonal::{DistanceMap, StartRegion, Stop};
-use crate::error::{BadPlace, Error, Location, Obstacle, Result, Role, Trouble};
+use crate::error::{Error, Location, Obstacle, PlaceError, PlaceErrorKind, Result, Role};
 use crate::grid::{GridFrame, Shapes, rasterise};
 use crate::linalg::Sym2;
 use crate::metric::{Metric, MetricField, Modifiers};
@@ -129,8 +129,8 @@ impl Scenario {
         for site in self.starts.iter().chain(&self.goals) {
             let (col, row) = site.cell();
             if !is_open(col, row) {
-                let trouble = Trouble::Closed(self.obstacles_at(col, row));
-                return Err(site.refusal(&self.georeference, trouble, is_open));
+                let kind = PlaceErrorKind::Closed(self.obstacles_at(col, row));
+                return Err(site.refusal(&self.georeference, kind, is_open));
             }
         }
         Ok(field)
@@ -270,8 +270,8 @@ impl OpenGround<'_> {
             return Ok(());
         }
         let is_void = self.terrain.is_void(col, row);
-        let trouble = if is_void { Trouble::Void } else { Trouble::Barrier };
-        Err(site.refusal(self.terrain.georeference(), trouble, |c, r| self.is_open(c, r)))
+        let kind = if is_void { PlaceErrorKind::Void } else { PlaceErrorKind::Barrier };
+        Err(site.refusal(self.terrain.georeference(), kind, |c, r| self.is_open(c, r)))
     }
 
     /// # Errors
@@ -286,7 +286,7 @@ impl OpenGround<'_> {
         if nodes.any(|(col, row)| touched[frame.index(col, row)] && self.is_open(col, row)) {
             return Ok(());
         }
-        Err(bad_file(Role::Start, start, Trouble::OffGround))
+        Err(bad_file(Role::Start, start, PlaceErrorKind::OffGround))
     }
 }
 
@@ -296,9 +296,84 @@ fn check_points(goal: &Place, shapes: &Shapes) -> Result<()> {
     if shapes.lines.is_empty() && shapes.polygons.is_empty() {
         return Ok(());
     }
-    Err(bad_file(Role::Goal, goal, Trouble::NotPoints))
+    Err(bad_file(Role::Goal, goal, PlaceErrorKind::NotPoints))
 }
 
-fn bad_file(role: Role, place: &Place, trouble: Trouble) -> Error {
-    Error::Place(Box::new(BadPlace { role, name: place.to_string(), trouble, nearest: None }))
+fn bad_file(role: Role, place: &Place, kind: PlaceErrorKind) -> Error {
+    Error::Place(Box::new(PlaceError { role, name: place.to_string(), kind, nearest: None }))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::grid::Ground;
+    use crate::metric::Isotropic;
+    use crate::terrain::Crs;
+
+    /// Level ground of 9 × 5 cells of 10 m with a column of voids in the middle, but for the last row if there is a gap.
+    fn split(gap: bool) -> Terrain {
+        let frame = GridFrame::new(9, 5, DVec2::ZERO, DVec2::splat(10.0), Ground::METRES).unwrap();
+        let is_void = |node: usize| node % 9 == 4 && !(gap && node / 9 == 4);
+        let heights = (0..45).map(|node| if is_void(node) { f64::NAN } else { 100.0 }).collect();
+        Terrain::new(frame, heights, Crs::none()).unwrap()
+    }
+
+    fn scenario(terrain: &Terrain, start: &str, goal: &str) -> Result<Scenario> {
+        let question = Question::new("split.tif").from(start.parse()?).to(goal.parse()?);
+        Scenario::on(terrain, question, &Control::default())
+    }
+
+    #[test]
+    fn bad_places_are_told_as_data() {
+        let refused = |start: &str, goal: &str| match scenario(&split(true), start, goal) {
+            Err(Error::Place(place)) => *place,
+            other => panic!("{other:?}"),
+        };
+        let void = refused("pixel:4,1", "pixel:0,0");
+        assert_eq!((void.role, void.kind), (Role::Start, PlaceErrorKind::Void));
+        assert_eq!((void.name.as_str(), void.nearest.as_deref()), ("pixel:4,1", Some("pixel:3,1")));
+        let outside = refused("0,0", "70,-90");
+        assert_eq!(outside.role, Role::Goal);
+        let PlaceErrorKind::Outside { from, to, swapped } = outside.kind else { panic!() };
+        assert_eq!((from.as_str(), to.as_str(), swapped), ("0,-40", "80,0", None));
+        assert_eq!(outside.nearest.as_deref(), Some("70,-40"));
+    }
+
+    #[test]
+    fn routes_lead_through_the_gap_or_nowhere() {
+        let control = Control::default();
+        for gap in [true, false] {
+            let scenario = scenario(&split(gap), "pixel:1,1", "pixel:7,1").unwrap();
+            let field = scenario.bind(&Isotropic, &control).unwrap();
+            match scenario.routes(&field, &control) {
+                Ok(routes) => {
+                    assert!(gap && routes.len() == 1);
+                    assert!(routes[0].summary.length_m > 60.0);
+                }
+                Err(Error::NoPath { goal, between, nearest }) => {
+                    assert!(!gap);
+                    assert_eq!(goal, Location::Grid(DVec2::new(7.0, 1.0)));
+                    assert_eq!(between, [Obstacle::Void]);
+                    assert_eq!(nearest, Some(Location::Grid(DVec2::new(3.0, 1.0))));
+                }
+                Err(error) => panic!("{error}"),
+            }
+        }
+    }
+
+    #[test]
+    fn the_record_names_what_was_asked() {
+        let scenario = scenario(&split(true), "pixel:1,1", "10,-20").unwrap();
+        let field = scenario.bind(&Isotropic, &Control::default()).unwrap();
+        let record = scenario.provenance(&[field], Some("ridgeway route".into()));
+        let json = serde_json::to_value(record).unwrap();
+        assert_eq!(json["start"][0], "pixel:1,1");
+        assert_eq!(json["goal"][0], "10,-20");
+        assert_eq!(json["dem"], "split.tif");
+        assert_eq!(json["accuracy"], "fast");
+        assert_eq!(json["metrics"][0]["name"], "isotropic");
+        assert!(json["metrics"][0]["delta_per_m"].is_null());
+    }
 }

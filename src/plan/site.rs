@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::geometry::read_geojson;
 use super::place::{Notation, Place};
-use crate::error::{BadPlace, Error, Result, Role, Trouble};
+use crate::error::{Error, PlaceError, PlaceErrorKind, Result, Role};
 use crate::grid::{GridFrame, Shapes};
 use crate::terrain::{Georeference, Terrain};
 
@@ -40,8 +40,8 @@ impl Site {
             // The surface ends at the outermost nodes, half a cell before the raster does.
             return Ok(Self { role, name, at: frame.clamp(grid), notation });
         }
-        let (trouble, nearest) = outside(notation, at, terrain)?;
-        Err(Error::Place(Box::new(BadPlace { role, name, trouble, nearest })))
+        let (kind, nearest) = outside(notation, at, terrain)?;
+        Err(Error::Place(Box::new(PlaceError { role, name, kind, nearest })))
     }
 
     /// The cell it lies in: column and row.
@@ -50,11 +50,11 @@ impl Site {
         (self.at.x.round() as usize, self.at.y.round() as usize)
     }
 
-    /// The error that refuses this site for its `trouble` and names the nearest cell that is good.
+    /// The error that refuses this site for its `kind` and names the nearest cell that is good.
     pub(super) fn refusal(
         &self,
         georeference: &Georeference,
-        trouble: Trouble,
+        kind: PlaceErrorKind,
         good: impl Fn(usize, usize) -> bool,
     ) -> Error {
         let near = nearest(georeference.frame(), self.at, good);
@@ -62,7 +62,7 @@ impl Site {
         match written {
             Ok(nearest) => {
                 let Self { role, ref name, .. } = *self;
-                Error::Place(Box::new(BadPlace { role, name: name.clone(), trouble, nearest }))
+                Error::Place(Box::new(PlaceError { role, name: name.clone(), kind, nearest }))
             }
             Err(error) => error,
         }
@@ -70,7 +70,11 @@ impl Site {
 }
 
 /// What is wrong with a place outside the DEM, and the nearest place on it.
-fn outside(notation: Notation, at: DVec2, terrain: &Terrain) -> Result<(Trouble, Option<String>)> {
+fn outside(
+    notation: Notation,
+    at: DVec2,
+    terrain: &Terrain,
+) -> Result<(PlaceErrorKind, Option<String>)> {
     let (frame, georeference) = (terrain.frame(), terrain.georeference());
     let last = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
     let (low, high) = match notation {
@@ -79,14 +83,14 @@ fn outside(notation: Notation, at: DVec2, terrain: &Terrain) -> Result<(Trouble,
     };
     let swapped = DVec2::new(at.y, at.x);
     let is_swapped = notation.to_grid(swapped, georeference).is_ok_and(|grid| frame.covers(grid));
-    let trouble = Trouble::Outside {
+    let kind = PlaceErrorKind::Outside {
         from: notation.write(low, georeference)?,
         to: notation.write(high, georeference)?,
         swapped: is_swapped.then(|| (notation.axes(), Place::At(notation, swapped).to_string())),
     };
     let grid = frame.clamp(notation.to_grid(at, georeference)?);
     let near = nearest(frame, grid, |col, row| !terrain.is_void(col, row));
-    Ok((trouble, near.map(|near| notation.write(near, georeference)).transpose()?))
+    Ok((kind, near.map(|near| notation.write(near, georeference)).transpose()?))
 }
 
 /// The shapes of places, those of each apart, and all their points as sites.
