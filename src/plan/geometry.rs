@@ -18,14 +18,16 @@ pub fn read_geojson(path: impl AsRef<Path>, georeference: &Georeference) -> Resu
     let path = path.as_ref();
     let text = fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
     if text.is_empty() {
-        return Err(Error::format(path, "the file is empty"));
+        return Err(Error::argument("the file", "empty", "GeoJSON").in_file(path));
     }
     let shapes = lonlat_shapes(&text)
-        .map_err(|error| Error::format(path, format!("is not GeoJSON: {error}")))?
+        .map_err(|error| Error::damaged("the GeoJSON", error).in_file(path))?
         .try_map(|lonlat| georeference.from_lonlat(lonlat))
         .map_err(|error| error.in_file(path))?;
     if shapes.is_empty() {
-        return Err(Error::format(path, "holds no points, lines or areas"));
+        return Err(
+            Error::argument("the number of points, lines and areas", 0, "1 or more").in_file(path)
+        );
     }
     Ok(shapes)
 }

@@ -15,14 +15,9 @@ use crate::terrain::read_bands;
 pub(super) fn read_tensors(path: &Path, frame: &GridFrame) -> Result<Arc<[Sym2]>> {
     let raster = read_bands(path)?;
     let [xx, xy, yy] = &raster.bands[..] else {
-        let found = match raster.bands.len() {
-            1 => "1 band".into(),
-            bands => format!("{bands} bands"),
-        };
-        return Err(Error::format(
-            path,
-            format!("has {found}; a tensor raster has three: D11, D12, D22"),
-        ));
+        let found = raster.bands.len();
+        let expected = "3 for tensors: D11, D12, D22";
+        return Err(Error::argument("the number of bands", found, expected).in_file(path));
     };
     check_grid(path, &raster.frame, frame)?;
     Ok(xx.iter().zip(xy).zip(yy).map(|((&xx, &xy), &yy)| Sym2 { xx, xy, yy }).collect())
@@ -36,7 +31,7 @@ pub(super) fn read_costs(path: &Path, frame: &GridFrame) -> Result<Arc<[f32]>> {
     let raster = read_bands(path)?;
     let [cost] = &raster.bands[..] else {
         let found = raster.bands.len();
-        return Err(Error::format(path, format!("has {found} bands; a cost raster has one")));
+        return Err(Error::argument("the number of bands", found, "1 for costs").in_file(path));
     };
     check_grid(path, &raster.frame, frame)?;
     Ok(cost.iter().map(|&cost| cost as f32).collect())
@@ -55,12 +50,7 @@ fn check_grid(path: &Path, theirs: &GridFrame, ours: &GridFrame) -> Result<()> {
         let (cols, rows, origin) = (frame.cols(), frame.rows(), frame.origin());
         format!("{cols} x {rows} cells from {},{}", origin.x, origin.y)
     };
-    Err(Error::format(
-        path,
-        format!(
-            "its grid of {} is not the DEM's of {}; resample it to the DEM, for example with gdalwarp -te -ts",
-            grid(theirs),
-            grid(ours)
-        ),
-    ))
+    Err(Error::argument("the grid", grid(theirs), format!("that of the DEM, {}", grid(ours)))
+        .advise("resample it to the DEM, for example with `gdalwarp -te -ts`")
+        .in_file(path))
 }
