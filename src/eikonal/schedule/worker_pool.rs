@@ -42,7 +42,7 @@ const STAY: u32 = 256;
 const TURN: usize = 2048;
 /// So many solves may be under way on one thread, each begun while the one before gave way. Each keeps its memory and some of the
 /// thread's stack.
-const MOST_NESTED: u32 = 8;
+const MOST_NESTED: u32 = 4;
 /// Glances at what is waited for after which other threads are let run on the core in between.
 const GLANCES: u32 = 1000;
 /// Glances after which a worker leaves.
