@@ -313,7 +313,8 @@ fn thread_count_changes_no_bit() {
 #[test]
 fn solves_side_by_side_are_as_alone() {
     let start = |i: usize| DVec2::new(20.0 + 15.0 * i as f64, 90.5);
-    let f = field(200, 200, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
+    // Large enough to give way to each other.
+    let f = field(450, 450, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
     let alone: Vec<_> = (0..8).map(|i| solve(f.clone(), start(i)).values).collect();
     for threads in [1, 2, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -357,7 +358,7 @@ fn a_small_solve_is_over_before_large_ones_that_begin_with_it() {
 
 #[test]
 fn cancelling_one_of_several_solves_does_not_disturb_the_others() {
-    let f = field(300, 300, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
+    let f = field(450, 450, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
     let start = [StartRegion::from(DVec2::new(20.0, 90.5))];
     let solve =
         |control: &Control| Solver::default().solve_field(f.clone(), &start, &Stop::Never, control);
