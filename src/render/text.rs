@@ -2,23 +2,34 @@
 
 use std::sync::LazyLock;
 
-use ab_glyph::{Font, FontRef, OutlineCurve, PxScale, PxScaleFont, ScaleFont};
 use glam::Vec2;
 use tiny_skia::{Path, PathBuilder};
+use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
-static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
-    FontRef::try_from_slice(dejavu::sans::regular()).expect("the embedded DejaVu Sans is a font")
+static FONT: LazyLock<Face<'static>> = LazyLock::new(|| {
+    Face::parse(dejavu::sans::regular(), 0).expect("the embedded DejaVu Sans is a font")
 });
 
-fn scaled(size: f32) -> PxScaleFont<&'static FontRef<'static>> {
-    let em = FONT.height_unscaled() / FONT.units_per_em().unwrap_or(1.0);
-    FONT.as_scaled(PxScale::from(size * em))
+/// Pixels per font unit at `size` pixels per em.
+fn scale(size: f32) -> f32 {
+    let height = f32::from(FONT.ascender()) - f32::from(FONT.descender());
+    size * (height / f32::from(FONT.units_per_em())) / height
+}
+
+/// The glyph of a character; the box for unknown ones if the font has none.
+fn glyph(c: char) -> GlyphId {
+    FONT.glyph_index(c).unwrap_or_default()
+}
+
+/// From the origin of a glyph to that of the next one, in font units.
+fn advance(glyph: GlyphId) -> f32 {
+    FONT.glyph_hor_advance(glyph).unwrap_or_default().into()
 }
 
 /// Width of `text` in pixels at `size` pixels per em.
 pub(super) fn width(text: &str, size: f32) -> f32 {
-    let font = scaled(size);
-    text.chars().map(|c| font.h_advance(font.glyph_id(c))).sum()
+    let scale = scale(size);
+    text.chars().map(|c| scale * advance(glyph(c))).sum()
 }
 
 /// `text`, or its beginning and an ellipsis, no wider than `limit` pixels.
@@ -26,10 +37,10 @@ pub(super) fn fitted(text: &str, size: f32, limit: f32) -> String {
     if width(text, size) <= limit {
         return text.to_owned();
     }
-    let font = scaled(size);
+    let scale = scale(size);
     let mut used = width("…", size);
     let kept = text.chars().take_while(|&c| {
-        used += font.h_advance(font.glyph_id(c));
+        used += scale * advance(glyph(c));
         used <= limit
     });
     kept.chain(['…']).collect()
@@ -37,52 +48,56 @@ pub(super) fn fitted(text: &str, size: f32, limit: f32) -> String {
 
 /// The outline of `text` whose baseline begins at `at`; `None` if nothing is visible.
 pub(super) fn outline(text: &str, size: f32, at: Vec2) -> Option<Path> {
-    let font = scaled(size);
-    let mut path = PathBuilder::new();
-    let mut pen = at;
+    let scale = scale(size);
+    let mut pen = Pen { path: PathBuilder::new(), scale, at, start: Vec2::ZERO };
     for c in text.chars() {
-        let glyph = font.glyph_id(c);
-        // Font units run up the page, pixels down.
-        let scale = Vec2::new(font.h_scale_factor(), -font.v_scale_factor());
-        if let Some(outline) = FONT.outline(glyph) {
-            push_curves(&mut path, &outline.curves, |p| pen + scale * Vec2::new(p.x, p.y));
-        }
-        pen.x += font.h_advance(glyph);
+        let glyph = glyph(c);
+        FONT.outline_glyph(glyph, &mut pen);
+        pen.at.x += scale * advance(glyph);
     }
-    path.finish()
+    pen.path.finish()
 }
 
-fn push_curves(
-    path: &mut PathBuilder,
-    curves: &[OutlineCurve],
-    place: impl Fn(ab_glyph::Point) -> Vec2,
-) {
-    let mut end = None;
-    for curve in curves {
-        let (OutlineCurve::Line(start, _)
-        | OutlineCurve::Quad(start, _, _)
-        | OutlineCurve::Cubic(start, _, _, _)) = *curve;
-        if end != Some(start) {
-            let p = place(start);
-            path.move_to(p.x, p.y);
-        }
-        end = Some(match *curve {
-            OutlineCurve::Line(_, b) => {
-                let p = place(b);
-                path.line_to(p.x, p.y);
-                b
-            }
-            OutlineCurve::Quad(_, b, c) => {
-                let [p, q] = [b, c].map(&place);
-                path.quad_to(p.x, p.y, q.x, q.y);
-                c
-            }
-            OutlineCurve::Cubic(_, b, c, d) => {
-                let [p, q, r] = [b, c, d].map(&place);
-                path.cubic_to(p.x, p.y, q.x, q.y, r.x, r.y);
-                d
-            }
-        });
+/// Draws glyphs into a path.
+struct Pen {
+    path: PathBuilder,
+    scale: f32,
+    /// The origin of the glyph, in pixels.
+    at: Vec2,
+    /// Where the contour began, in pixels.
+    start: Vec2,
+}
+
+impl Pen {
+    /// Font units run up the page, pixels down.
+    fn place(&self, x: f32, y: f32) -> Vec2 {
+        self.at + Vec2::new(self.scale, -self.scale) * Vec2::new(x, y)
+    }
+}
+
+impl OutlineBuilder for Pen {
+    fn move_to(&mut self, x: f32, y: f32) {
+        self.start = self.place(x, y);
+        self.path.move_to(self.start.x, self.start.y);
+    }
+
+    fn line_to(&mut self, x: f32, y: f32) {
+        let p = self.place(x, y);
+        self.path.line_to(p.x, p.y);
+    }
+
+    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
+        let [p, q] = [(x1, y1), (x, y)].map(|(x, y)| self.place(x, y));
+        self.path.quad_to(p.x, p.y, q.x, q.y);
+    }
+
+    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
+        let [p, q, r] = [(x1, y1), (x2, y2), (x, y)].map(|(x, y)| self.place(x, y));
+        self.path.cubic_to(p.x, p.y, q.x, q.y, r.x, r.y);
+    }
+
+    fn close(&mut self) {
+        self.path.line_to(self.start.x, self.start.y);
     }
 }
 
