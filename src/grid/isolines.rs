@@ -185,7 +185,7 @@ fn cell_segments(corner: [f64; 4], level: f64, mut segment: impl FnMut(usize, us
     let falls = |k: usize| above[k] && !above[(k + 1) % 4];
     let saddle = above[0] == above[2] && above[1] == above[3] && above[0] != above[1];
     if saddle {
-        // The mean of the corners, the bilinear value in the middle, tells which pair is connected.
+        // The mean of the corners, the bilinear value in the middle, decides which pair is connected.
         let middle = corner.iter().sum::<f64>() / 4.0 >= level;
         for k in (0..4).filter(|&k| rises(k)) {
             segment(k, if middle { (k + 3) % 4 } else { (k + 1) % 4 });

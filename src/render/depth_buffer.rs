@@ -95,22 +95,16 @@ impl DepthBuffer {
         let (least, most) = (a.min(b).min(c).ceil(), a.max(b).max(c));
         for y in least.y as usize..=most.y as usize {
             for x in least.x as usize..=most.x as usize {
-                let Some(shares) = barycentric(places, DVec2::new(x as f64, y as f64)) else {
+                let Some(weights) = barycentric(places, DVec2::new(x as f64, y as f64)) else {
                     continue;
                 };
-                let depth = mean(shares, &corners, |corner| corner.at.z);
+                let depth = mean(weights, &corners, |corner| corner.at.z);
                 let Some(sample) = self.nearest(x, y, depth) else { continue };
                 let closest =
-                    (1..3).fold(0, |best, i| if shares[i] > shares[best] { i } else { best });
-                let colour = if blend {
-                    let channel = |of: fn(Rgb) -> u8| {
-                        mean(shares, &corners, |corner| of(corner.colour).into()).round() as u8
-                    };
-                    Rgb(channel(|c| c.0), channel(|c| c.1), channel(|c| c.2))
-                } else {
-                    corners[closest].colour
-                };
-                let light = mean(shares, &corners, |corner| corner.light);
+                    (1..3).fold(0, |best, i| if weights[i] > weights[best] { i } else { best });
+                let colour =
+                    if blend { mean_colour(weights, &corners) } else { corners[closest].colour };
+                let light = mean(weights, &corners, |corner| corner.light);
                 self.colours[sample] = Rgb(0, 0, 0).mix(colour, light);
                 self.regions[sample] = corners[closest].region;
             }
@@ -172,15 +166,20 @@ impl DepthBuffer {
     }
 }
 
-/// The mean of a quantity of the corners of a triangle, weighted by `shares`.
-fn mean(shares: [f64; 3], corners: &[Vertex; 3], of: impl Fn(&Vertex) -> f64) -> f64 {
-    shares.iter().zip(corners).map(|(share, corner)| share * of(corner)).sum()
+/// The mean of a quantity of the corners of a triangle, weighted by `weights`.
+fn mean(weights: [f64; 3], corners: &[Vertex; 3], of: impl Fn(&Vertex) -> f64) -> f64 {
+    weights.iter().zip(corners).map(|(weight, corner)| weight * of(corner)).sum()
+}
+
+fn mean_colour(weights: [f64; 3], corners: &[Vertex; 3]) -> Rgb {
+    let channel = |of: fn(Rgb) -> u8| mean(weights, corners, |c| of(c.colour).into()).round() as u8;
+    Rgb(channel(|c| c.0), channel(|c| c.1), channel(|c| c.2))
 }
 
 /// The barycentric coordinates of a point, one for each corner; `None` outside the triangle.
 fn barycentric([a, b, c]: [DVec2; 3], p: DVec2) -> Option<[f64; 3]> {
     let area = (b - a).perp_dot(c - a);
-    let shares = [(b - p).perp_dot(c - p), (c - p).perp_dot(a - p), (a - p).perp_dot(b - p)]
-        .map(|share| share / area);
-    (!shares.iter().any(|&share| share < 0.0)).then_some(shares)
+    let weights = [(b - p).perp_dot(c - p), (c - p).perp_dot(a - p), (a - p).perp_dot(b - p)]
+        .map(|weight| weight / area);
+    (!weights.iter().any(|&weight| weight < 0.0)).then_some(weights)
 }

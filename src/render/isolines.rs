@@ -31,6 +31,13 @@ pub(super) struct Label {
     colour: Rgb,
 }
 
+impl Label {
+    /// Whether it leaves a rectangle around `middle` free.
+    fn is_apart(&self, middle: Vec2, half: Vec2) -> bool {
+        (middle - self.middle).abs().cmpgt(self.half + half).any()
+    }
+}
+
 /// Thin lines, every fifth thicker; and where along each thick one its label may go, best first.
 pub(super) fn draw_isolines(layout: &mut MapLayout, layer: &IsolineLayer<'_>) -> Vec<Vec<Label>> {
     let mut labels = Vec::new();
@@ -66,14 +73,14 @@ pub(super) fn draw_labels(layout: &mut MapLayout, labels: Vec<Vec<Label>>, taken
     let size = LABEL * layout.unit;
     let mut drawn: Vec<Label> = Vec::new();
     for places in labels {
-        let free = |l: &Label| {
-            let apart = |p: Vec2, reach: Vec2| (p - l.middle).abs().cmpgt(l.half + reach).any();
-            layout.shows(l.middle - l.half)
-                && layout.shows(l.middle + l.half)
-                && taken.iter().all(|&p| apart(p, Vec2::splat(10.0 * layout.unit)))
-                && drawn.iter().all(|d| apart(d.middle, d.half))
+        let reach = Vec2::splat(10.0 * layout.unit);
+        let is_free = |label: &Label| {
+            layout.shows(label.middle - label.half)
+                && layout.shows(label.middle + label.half)
+                && taken.iter().all(|&point| label.is_apart(point, reach))
+                && drawn.iter().all(|other| label.is_apart(other.middle, other.half))
         };
-        if let Some(label) = places.into_iter().find(free) {
+        if let Some(label) = places.into_iter().find(is_free) {
             let width = text::width(&label.text, size);
             let baseline = label.middle + Vec2::new(-width / 2.0, 0.36 * size);
             layout.canvas.text(&label.text, size, baseline, label.colour, 3.0 * layout.unit);

@@ -42,7 +42,7 @@ pub struct MapPicture<'a> {
     /// Isolines, drawn in this order.
     pub isolines: Vec<IsolineLayer<'a>>,
     /// Routes, drawn in this order, each thinner than the one before, so that all of them are seen
-    /// where they share the way.
+    /// where they run together.
     pub routes: Vec<RouteLayer<'a>>,
     /// Starts, in grid coordinates.
     pub starts: Vec<DVec2>,
@@ -220,13 +220,13 @@ mod tests {
         let heights = vec![0.0; 5000];
         let mut barriers = vec![false; 5000];
         barriers[10 * 100 + 80] = true;
-        let way = [DVec2::new(10.0, 25.0), DVec2::new(90.0, 25.0)];
+        let path = [DVec2::new(10.0, 25.0), DVec2::new(90.0, 25.0)];
         let mut map = MapPicture::new(&frame, &heights);
         map.max_side_px = 1600;
         map.barriers = &barriers;
-        map.routes = vec![RouteLayer { grid: &way, colour: Rgb::BLUE, label: "r".into() }];
-        map.starts = vec![way[0]];
-        map.goals = vec![way[1]];
+        map.routes = vec![RouteLayer { grid: &path, colour: Rgb::BLUE, label: "r".into() }];
+        map.starts = vec![path[0]];
+        map.goals = vec![path[1]];
         let picture = map.render().unwrap();
         let layout = MapLayout::new(&frame, "", 1600, []).unwrap();
         let pixel = |grid: DVec2, off: f32| {
@@ -235,8 +235,8 @@ mod tests {
             Rgb(r, g, b)
         };
         assert_eq!(pixel(DVec2::new(50.0, 25.0), 0.0), Rgb::BLUE);
-        assert_eq!(pixel(way[0], 11.5), Rgb::GREEN);
-        assert_eq!(pixel(way[1], 11.5), Rgb::PURPLE);
+        assert_eq!(pixel(path[0], 11.5), Rgb::GREEN);
+        assert_eq!(pixel(path[1], 11.5), Rgb::PURPLE);
         let ground = pixel(DVec2::new(50.0, 10.0), 0.0);
         assert_eq!(pixel(DVec2::new(80.0, 10.0), 0.0), ground.mix(BARRIER, 0.5));
         // Twice as wide as tall, as on the ground.

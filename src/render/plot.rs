@@ -59,16 +59,13 @@ impl LogPlot {
             ));
         }
         let mut canvas = Canvas::new(SIDE, SIDE)?;
-        let decades = [0, 1].map(|axis| decades(self.marks.iter().map(|mark| mark.at[axis])));
-        draw_axis(&mut canvas, decades[0], &place_x(decades[0]), true);
-        draw_axis(&mut canvas, decades[1], &place_y(decades[1]), false);
-        let (x, y) = (place_x(decades[0]), place_y(decades[1]));
-        let place = |mark: &Mark| Vec2::new(x(mark.at.x), y(mark.at.y));
+        let axes = Axes([0, 1].map(|axis| decades(self.marks.iter().map(|mark| mark.at[axis]))));
+        axes.draw(&mut canvas);
         for mark in &self.marks {
-            draw_mark(&mut canvas, place(mark), mark.kind, mark.colour);
+            draw_mark(&mut canvas, axes.place(mark.at), mark.kind, mark.colour);
         }
         for mark in &self.marks {
-            let beside = place(mark) + Vec2::new(16.0, 6.0);
+            let beside = axes.place(mark.at) + Vec2::new(16.0, 6.0);
             canvas.text(&mark.label, 0.7 * TEXT, beside, Rgb::INK, 2.0);
         }
         self.draw_words(&mut canvas);
@@ -120,33 +117,46 @@ fn share([low, high]: [i32; 2], value: f64) -> f32 {
     ((value.log10() - f64::from(low)) / f64::from(high - low)).clamp(0.0, 1.0) as f32
 }
 
-fn place_x(decades: [i32; 2]) -> impl Fn(f64) -> f32 {
-    move |value| LEFT + share(decades, value) * (SIDE as f32 - LEFT - RIGHT)
-}
+/// The decades of x and of y.
+struct Axes([[i32; 2]; 2]);
 
-fn place_y(decades: [i32; 2]) -> impl Fn(f64) -> f32 {
-    move |value| SIDE as f32 - BOTTOM - share(decades, value) * (SIDE as f32 - TOP - BOTTOM)
-}
-
-/// Lines across the plot at powers of ten, with their numbers.
-fn draw_axis(canvas: &mut Canvas, [low, high]: [i32; 2], place: &dyn Fn(f64) -> f32, is_x: bool) {
-    let side = SIDE as f32;
-    let every = ((high - low) / 6).max(1) as usize;
-    for power in (low..=high).step_by(every) {
-        let at = place(10f64.powi(power));
-        let label = power_of_ten(power);
-        let size = 0.85 * TEXT;
-        let width = text::width(&label, size);
-        let (ends, baseline) = if is_x {
-            let ends = [Vec2::new(at, TOP), Vec2::new(at, side - BOTTOM)];
-            (ends, Vec2::new(at - 0.5 * width, side - BOTTOM + 30.0))
-        } else {
-            let ends = [Vec2::new(LEFT, at), Vec2::new(side - RIGHT, at)];
-            (ends, Vec2::new(LEFT - 14.0 - width, at + 0.36 * size))
-        };
-        canvas.lines(&[ends.to_vec()], 1.5, GRID, 1.0);
-        canvas.text(&label, size, baseline, Rgb::INK, 0.0);
+impl Axes {
+    fn x(&self, value: f64) -> f32 {
+        LEFT + share(self.0[0], value) * (SIDE as f32 - LEFT - RIGHT)
     }
+
+    fn y(&self, value: f64) -> f32 {
+        SIDE as f32 - BOTTOM - share(self.0[1], value) * (SIDE as f32 - TOP - BOTTOM)
+    }
+
+    fn place(&self, at: DVec2) -> Vec2 {
+        Vec2::new(self.x(at.x), self.y(at.y))
+    }
+
+    /// Lines across the plot at powers of ten, with their numbers.
+    fn draw(&self, canvas: &mut Canvas) {
+        let (right, bottom) = (SIDE as f32 - RIGHT, SIDE as f32 - BOTTOM);
+        let size = 0.85 * TEXT;
+        for power in shown_powers(self.0[0]) {
+            let x = self.x(10f64.powi(power));
+            let label = power_of_ten(power);
+            let baseline = Vec2::new(x - 0.5 * text::width(&label, size), bottom + 30.0);
+            canvas.lines(&[vec![Vec2::new(x, TOP), Vec2::new(x, bottom)]], 1.5, GRID, 1.0);
+            canvas.text(&label, size, baseline, Rgb::INK, 0.0);
+        }
+        for power in shown_powers(self.0[1]) {
+            let y = self.y(10f64.powi(power));
+            let label = power_of_ten(power);
+            let left = LEFT - 14.0 - text::width(&label, size);
+            canvas.lines(&[vec![Vec2::new(LEFT, y), Vec2::new(right, y)]], 1.5, GRID, 1.0);
+            canvas.text(&label, size, Vec2::new(left, y + 0.36 * size), Rgb::INK, 0.0);
+        }
+    }
+}
+
+/// Powers of ten that an axis names, a dozen at most.
+fn shown_powers([low, high]: [i32; 2]) -> impl Iterator<Item = i32> {
+    (low..=high).step_by(((high - low) / 6).max(1) as usize)
 }
 
 /// `10⁻³`.

@@ -50,25 +50,19 @@ impl Relief {
             .map(|i| gradient(&means, cols, rows, i, spacing[i / cols]))
             .collect();
 
-        let known = || means.iter().copied().filter(|h| h.is_finite());
-        let (low, high) =
-            known().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), h| (a.min(h), b.max(h)));
-        let square: f64 = gradients.iter().map(|g| g.length_squared()).sum();
-        let rms = (square / known().count().max(1) as f64).sqrt();
-        let [least, most] = EXAGGERATION;
-        let exaggeration = if rms > 0.0 { (SLOPE_SHOWN / rms).clamp(least, most) } else { 1.0 };
-
-        let colour = |(h, gradient): (&f64, &DVec2)| {
-            let height = if high > low { (h - low) / (high - low) } else { 0.5 };
-            if h.is_finite() {
-                let Rgb(r, g, b) = shaded(tint(height), brightness(*gradient * exaggeration));
-                Vec4::new(r.into(), g.into(), b.into(), 1.0)
-            } else {
-                Vec4::ZERO
+        let [low, high] = known(&means)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| [a.min(h), b.max(h)]);
+        let exaggeration = exaggeration(&gradients, known(&means).count());
+        let points = means.par_iter().zip(&gradients);
+        let colours = points.map(|(h, &gradient)| {
+            if !h.is_finite() {
+                return Vec4::ZERO;
             }
-        };
-        let colours = means.par_iter().zip(&gradients).map(colour).collect();
-        Self { cols, rows, block, colours }
+            let height = if high > low { (h - low) / (high - low) } else { 0.5 };
+            let Rgb(r, g, b) = shaded(tint(height), brightness(gradient * exaggeration));
+            Vec4::new(r.into(), g.into(), b.into(), 1.0)
+        });
+        Self { cols, rows, block, colours: colours.collect() }
     }
 
     /// The colour at grid coordinates of the original grid, bilinear between the known points around;
@@ -91,6 +85,19 @@ impl Relief {
         let mean = sum / sum.w + 0.5;
         Some(Rgb(mean.x as u8, mean.y as u8, mean.z as u8))
     }
+}
+
+fn known(heights: &[f64]) -> impl Iterator<Item = f64> {
+    heights.iter().copied().filter(|h| h.is_finite())
+}
+
+/// Factor on the slopes of so many known points that makes their root mean square [`SLOPE_SHOWN`]; gradients are zero where
+/// nothing is known.
+fn exaggeration(gradients: &[DVec2], known: usize) -> f64 {
+    let square: f64 = gradients.iter().map(|g| g.length_squared()).sum();
+    let rms = (square / known.max(1) as f64).sqrt();
+    let [least, most] = EXAGGERATION;
+    if rms > 0.0 { (SLOPE_SHOWN / rms).clamp(least, most) } else { 1.0 }
 }
 
 /// Mean of the known heights of each block of `block × block` nodes.
