@@ -1,7 +1,7 @@
 //! Routes, isolines and regions as GeoJSON (RFC 7946): longitude and latitude on WGS84, heights in metres.
 
 use ::geojson::{Feature, FeatureCollection, GeometryValue, JsonObject, Position};
-use geo_types::{LineString, MultiPolygon};
+use geo_types::MultiPolygon;
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 use serde_json::Value;
@@ -118,12 +118,11 @@ fn route_feature(name: &str, route: &Route) -> Shape {
 }
 
 fn isoline_feature(isoline: &Isoline, frame: &GridFrame, unit: &str) -> Shape {
-    let place =
-        |line: &Vec<DVec2>| line.iter().map(|&p| frame.to_map(p).extend(f64::NAN)).collect();
+    let lines = isoline.lines.iter().map(|line| on_map(line.iter().copied(), frame));
     let mut properties = JsonObject::new();
     properties.insert("distance".into(), isoline.level.into());
     properties.insert("unit".into(), unit.into());
-    Shape { geometry: Geometry::Lines(isoline.lines.iter().map(place).collect()), properties }
+    Shape { geometry: Geometry::Lines(lines.collect()), properties }
 }
 
 fn region_feature(
@@ -131,13 +130,16 @@ fn region_feature(
     polygons: &MultiPolygon<f64>,
     frame: &GridFrame,
 ) -> Shape {
-    let place = |ring: &LineString<f64>| {
-        ring.coords().map(|at| frame.to_map(DVec2::new(at.x, at.y)).extend(f64::NAN)).collect()
-    };
     let areas = polygons.iter().map(|polygon| {
-        std::iter::once(polygon.exterior()).chain(polygon.interiors()).map(place).collect()
+        let rings = std::iter::once(polygon.exterior()).chain(polygon.interiors());
+        rings.map(|ring| on_map(ring.coords().map(|at| DVec2::new(at.x, at.y)), frame)).collect()
     });
     Shape { geometry: Geometry::Areas(areas.collect()), properties }
+}
+
+/// Grid coordinates as map coordinates without heights.
+fn on_map(line: impl Iterator<Item = DVec2>, frame: &GridFrame) -> Vec<DVec3> {
+    line.map(|at| frame.to_map(at).extend(f64::NAN)).collect()
 }
 
 fn collection(
@@ -189,19 +191,26 @@ fn in_degrees(line: &[DVec3], to_lonlat: impl Fn(DVec2) -> Result<DVec2>) -> Res
 }
 
 fn value(geometry: &Geometry) -> GeometryValue {
-    let positions =
-        |line: &Vec<DVec3>| -> Vec<Position> { line.iter().map(|p| position(*p)).collect() };
-    let rings = |rings: &Vec<Vec<DVec3>>| -> Vec<_> { rings.iter().map(positions).collect() };
     match geometry {
         Geometry::Lines(lines) => match &lines[..] {
             [line] => GeometryValue::LineString { coordinates: positions(line) },
-            _ => GeometryValue::MultiLineString { coordinates: rings(lines) },
+            _ => GeometryValue::MultiLineString { coordinates: all_positions(lines) },
         },
         Geometry::Areas(areas) => match &areas[..] {
-            [area] => GeometryValue::Polygon { coordinates: rings(area) },
-            _ => GeometryValue::MultiPolygon { coordinates: areas.iter().map(rings).collect() },
+            [area] => GeometryValue::Polygon { coordinates: all_positions(area) },
+            _ => GeometryValue::MultiPolygon {
+                coordinates: areas.iter().map(|area| all_positions(area)).collect(),
+            },
         },
     }
+}
+
+fn all_positions(lines: &[Vec<DVec3>]) -> Vec<Vec<Position>> {
+    lines.iter().map(|line| positions(line)).collect()
+}
+
+fn positions(line: &[DVec3]) -> Vec<Position> {
+    line.iter().map(|&p| position(p)).collect()
 }
 
 /// The position to 7 decimals (a centimetre, if degrees) and the height to 2, or none if `NaN`.
@@ -212,7 +221,7 @@ fn position(p: DVec3) -> Position {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use geo_types::Polygon;
+    use geo_types::{LineString, Polygon};
     use serde_json::json;
 
     use super::*;
