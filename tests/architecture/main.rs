@@ -236,3 +236,17 @@ fn every_dependency_is_listed_with_its_reason() {
         crates.iter().filter(|name| !list.contains(&format!("`{name}`"))).collect();
     assert!(crates.len() > 20 && missing.is_empty(), "not in docs/dependencies.md: {missing:?}");
 }
+
+#[test]
+fn the_map_names_files_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let map = std::fs::read_to_string(root.join("docs/architecture.md")).unwrap();
+    let modules = House::open().source.modules;
+    let exists = |name: &&str| {
+        root.join(name).exists() || modules.iter().any(|module| module.file.ends_with(name))
+    };
+    // What stands between backticks.
+    let names = map.split('`').skip(1).step_by(2).filter(|name| name.ends_with(".rs"));
+    let gone: Vec<_> = names.filter(|name| !exists(name)).collect();
+    assert!(gone.is_empty(), "docs/architecture.md names {gone:?}");
+}
