@@ -245,8 +245,12 @@ fn the_map_names_files_that_exist() {
     let exists = |name: &&str| {
         root.join(name).exists() || modules.iter().any(|module| module.file.ends_with(name))
     };
-    // What stands between backticks.
-    let names = map.split('`').skip(1).step_by(2).filter(|name| name.ends_with(".rs"));
+    // What stands between backticks, patterns left out.
+    let names = map
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .filter(|name| name.ends_with(".rs") && !name.contains('*'));
     let gone: Vec<_> = names.filter(|name| !exists(name)).collect();
     assert!(gone.is_empty(), "docs/architecture.md names {gone:?}");
 }
