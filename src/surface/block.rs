@@ -103,17 +103,22 @@ impl JetBlock {
         jets
     }
 
-    /// The first jets of row `j` in space, into `row`, whose first is at `at` and where a step measures `axes`.
-    pub(super) fn row_in_space(&self, j: usize, at: DVec2, axes: DVec2, row: &mut [SurfaceJet]) {
+    /// Adds the first `count` jets of row `j` in space; the first is at `at`, and a step measures `axes`.
+    pub(super) fn add_row_in_space(
+        &self,
+        j: usize,
+        count: usize,
+        at: DVec2,
+        axes: DVec2,
+        row: &mut Vec<SurfaceJet>,
+    ) {
         match &self.0 {
-            Layout::Heights(jets) => {
-                for (i, out) in row.iter_mut().enumerate() {
-                    let at = at + DVec2::new(i as f64, 0.0);
-                    *out = jets.jet(j, i).in_space(at, axes);
-                }
-            }
-            Layout::Space(jets) => row.copy_from_slice(&jets[j * BLOCK..][..row.len()]),
-            Layout::Empty => row.fill(SurfaceJet::default()),
+            Layout::Heights(jets) => row.extend((0..count).map(|i| {
+                let at = at + DVec2::new(i as f64, 0.0);
+                jets.jet(j, i).in_space(at, axes)
+            })),
+            Layout::Space(jets) => row.extend_from_slice(&jets[j * BLOCK..][..count]),
+            Layout::Empty => row.resize(row.len() + count, SurfaceJet::default()),
         }
     }
 }

@@ -100,13 +100,13 @@ pub trait Surface: Sync {
 
     /// The jets in space at the nodes of a row.
     fn row_space_jets(&self, row: usize) -> Vec<SurfaceJet> {
-        let mut jets = vec![SurfaceJet::default(); self.cols()];
+        let mut jets = Vec::with_capacity(self.cols());
         let (axes, mut room) = (self.axes(row as f64), JetBlock::default());
-        for (i, jets) in jets.chunks_mut(BLOCK).enumerate() {
-            let first = i * BLOCK;
-            let block = Block { cols: first..first + jets.len(), rows: row..row + 1 };
-            self.block_jets(&block, &mut room);
-            room.row_in_space(0, DVec2::new(first as f64, row as f64), axes, jets);
+        for first in (0..self.cols()).step_by(BLOCK) {
+            let cols = first..self.cols().min(first + BLOCK);
+            let (count, at) = (cols.len(), DVec2::new(first as f64, row as f64));
+            self.block_jets(&Block { cols, rows: row..row + 1 }, &mut room);
+            room.add_row_in_space(0, count, at, axes, &mut jets);
         }
         jets
     }
