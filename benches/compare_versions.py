@@ -171,9 +171,10 @@ def differ_in_text(old, new):
     """Between texts with numbers in them."""
     if old == new:
         return None
+    numbers = [NUMBER.findall(text) for text in (old, new)]
     if NUMBER.split(old) != NUMBER.split(new):
-        return "other words or another number of numbers"
-    pairs = ((float(a), float(b)) for a, b in zip(NUMBER.findall(old), NUMBER.findall(new)))
+        return "other words, the same numbers" if numbers[0] == numbers[1] else "another structure"
+    pairs = ((float(a), float(b)) for a, b in zip(*numbers))
     return max((relative(a, b) for a, b in pairs if a != b), default="numbers written in another way")
 
 
