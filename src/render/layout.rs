@@ -58,7 +58,7 @@ impl MapLayout {
 
         let inner = size.as_vec2().x.max(NARROWEST * unit);
         let bar =
-            Entry::Scale { metres: round_step(f64::from(100.0 * unit) * metres_per_pixel, 1) };
+            Entry::ScaleBar { metres: round_step(f64::from(100.0 * unit) * metres_per_pixel, 1) };
         let entries = [bar, Entry::North].into_iter().chain(entries);
         let legend = Legend::new(entries, inner, Scale { unit, metres_per_pixel });
 

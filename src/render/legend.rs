@@ -18,7 +18,7 @@ const GAP: f32 = 34.0;
 /// One entry of a legend.
 pub(super) enum Entry {
     /// A bar that is `metres` long on the map.
-    Scale { metres: f64 },
+    ScaleBar { metres: f64 },
     /// An arrow to map north.
     North,
     /// A line of some width.
@@ -51,7 +51,7 @@ impl Legend {
     /// Places the entries in rows of at most `width` pixels. Labels that do not fit even alone are shortened.
     pub(super) fn new(entries: impl IntoIterator<Item = Entry>, width: f32, scale: Scale) -> Self {
         let mut pen = Vec2::ZERO;
-        let mut place = |mut entry: Entry| {
+        let entries = entries.into_iter().map(|mut entry| {
             entry.shorten(width, scale);
             let needed = entry.width(scale);
             if pen.x > 0.0 && pen.x + needed > width {
@@ -60,8 +60,8 @@ impl Legend {
             let at = pen;
             pen.x += needed + GAP * scale.unit;
             (entry, at)
-        };
-        Self { scale, entries: entries.into_iter().map(&mut place).collect() }
+        });
+        Self { scale, entries: entries.collect() }
     }
 
     /// Height in pixels.
@@ -81,10 +81,10 @@ impl Legend {
 impl Entry {
     fn label(&self) -> String {
         match self {
-            Self::Scale { metres } if *metres >= 1000.0 => {
+            Self::ScaleBar { metres } if *metres >= 1000.0 => {
                 format!("{} km", text::number(metres / 1000.0))
             }
-            Self::Scale { metres } => format!("{} m", text::number(*metres)),
+            Self::ScaleBar { metres } => format!("{} m", text::number(*metres)),
             Self::North => "N".into(),
             Self::Line { label, .. }
             | Self::Pin { label, .. }
@@ -96,7 +96,7 @@ impl Entry {
     /// Pixels of the symbol left of the label.
     fn symbol(&self, Scale { unit, metres_per_pixel }: Scale) -> f32 {
         match self {
-            Self::Scale { metres } => (metres / metres_per_pixel) as f32,
+            Self::ScaleBar { metres } => (metres / metres_per_pixel) as f32,
             Self::North => 18.0 * unit,
             Self::Pin { .. } => 34.0 * unit,
             Self::Line { .. } | Self::Patch { .. } => SYMBOL * unit,
@@ -127,7 +127,7 @@ impl Entry {
         let width = self.symbol(scale);
         let end = at + Vec2::new(width, 0.0);
         match self {
-            Self::Scale { .. } => {
+            Self::ScaleBar { .. } => {
                 let tick = Vec2::new(0.0, 7.0 * unit);
                 let bar = vec![at - tick, at + tick, at, end, end + tick, end - tick];
                 canvas.lines(&[bar], 2.5 * unit, Rgb::INK, 1.0);
