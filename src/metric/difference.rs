@@ -192,18 +192,11 @@ fn tensors(
 /// The automatic `δ`, see [`Difference::delta`]. It goes by the mean of `√(γ1+γ2)` over the area that is there and not of its square, since
 /// only the mean has a limit where the curvature jumps.
 fn offset(surface: &dyn Surface, form: DifferenceForm, changes: &[Change], share: f64) -> f64 {
-    let of_row = |(row, changes): (usize, &[Change])| {
-        let there = changes.iter().enumerate().filter(|(col, _)| !surface.is_void(*col, row));
-        there.fold([0.0; 3], |[sum, area, count], (_, change)| {
-            let rate = (change.gamma.xx + change.gamma.yy).sqrt() * change.area;
-            if rate.is_finite() {
-                [sum + rate, area + change.area, count + 1.0]
-            } else {
-                [sum, area, count]
-            }
-        })
-    };
-    let rows: Vec<_> = changes.par_chunks(surface.cols().max(1)).enumerate().map(of_row).collect();
+    let rows: Vec<_> = changes
+        .par_chunks(surface.cols().max(1))
+        .enumerate()
+        .map(|(row, changes)| sums_of_row(surface, row, changes))
+        .collect();
     // Added row by row, so that the sum does not depend on the number of threads.
     let [sum, area, count] =
         rows.iter().fold([0.0; 3], |sum, row| [0, 1, 2].map(|k| sum[k] + row[k]));
@@ -215,6 +208,19 @@ fn offset(surface: &dyn Surface, form: DifferenceForm, changes: &[Change], share
         DifferenceForm::Literal => area / count,
     };
     (share * (sum / area).powi(2)).max(1e-6 * unit)
+}
+
+/// `∫ √(γ1+γ2)`, area and number of the nodes of a row that are there.
+fn sums_of_row(surface: &dyn Surface, row: usize, changes: &[Change]) -> [f64; 3] {
+    let there = changes.iter().enumerate().filter(|(col, _)| !surface.is_void(*col, row));
+    there.fold([0.0; 3], |[sum, area, count], (_, change)| {
+        let rate = (change.gamma.xx + change.gamma.yy).sqrt() * change.area;
+        if rate.is_finite() {
+            [sum + rate, area + change.area, count + 1.0]
+        } else {
+            [sum, area, count]
+        }
+    })
 }
 
 /// An orthonormal frame `e_1, e_2` of the tangent plane in grid coordinates, `e_1` along `S_1`: with `G = LLᵀ`, `L = [a 0; b c]`,

@@ -41,6 +41,15 @@ impl RegionStatistics {
         })
     }
 
+    /// The means, of sums over the area.
+    fn mean(&self) -> Self {
+        let mut mean = Self { nodes: self.nodes, ..Self::default() };
+        if self.area_m2 > 0.0 {
+            mean.add(self, self.area_m2.recip());
+        }
+        mean
+    }
+
     /// Adds `part` with its means times `weight`.
     fn add(&mut self, part: &Self, weight: f64) {
         self.area_m2 += part.area_m2;
@@ -77,14 +86,7 @@ pub fn statistics(surface: &dyn Surface, level: &Level) -> Vec<RegionStatistics>
             }
         }
     }
-    let mean = |sum: &RegionStatistics| {
-        let mut mean = RegionStatistics { nodes: sum.nodes, ..RegionStatistics::default() };
-        if sum.area_m2 > 0.0 {
-            mean.add(sum, sum.area_m2.recip());
-        }
-        mean
-    };
-    sums.iter().map(mean).collect()
+    sums.iter().map(RegionStatistics::mean).collect()
 }
 
 #[cfg(test)]

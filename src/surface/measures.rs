@@ -49,26 +49,33 @@ pub(super) fn measured(
     counts: impl Fn(usize, usize) -> bool + Sync,
 ) -> Measures {
     let [cols, rows] = [surface.cols(), surface.rows()];
-    let [across, down] = surface.periodic();
-    let of_row = |row: usize| {
-        let jets = surface.row_space_jets(row).into_iter().enumerate();
-        let known = jets.filter(|(col, jet)| {
-            jet.is_regular() && !surface.is_void(*col, row) && counts(*col, row)
-        });
-        known.fold(Sums::default(), |sums, (col, jet)| {
-            let area = share(col, cols, across) * share(row, rows, down) * jet.area();
-            let square = area * jet.squared_curvature();
-            let steps = jet.first.map(|step| step.length());
-            sums.add(Sums { area, square, steps, nodes: 1.0 })
-        })
-    };
-    let of_rows: Vec<Sums> = (0..rows).into_par_iter().map(of_row).collect();
+    let of_rows: Vec<Sums> =
+        (0..rows).into_par_iter().map(|row| sums_of_row(surface, row, &counts)).collect();
     // Added row by row, so that the sum does not depend on the number of threads.
     let Sums { area, square, steps, nodes } = of_rows.into_iter().fold(Sums::default(), Sums::add);
     let mean = if area > 0.0 { 0.5 * square / area } else { 0.0 };
     let [width, height] = [cols as f64 * steps[0], rows as f64 * steps[1]];
     let extent = if nodes > 0.0 { width.hypot(height) / nodes } else { 0.0 };
     Measures { area, rms_curvature: mean.sqrt(), extent }
+}
+
+/// The sums over the nodes of a row that count.
+fn sums_of_row(
+    surface: &(impl Surface + ?Sized),
+    row: usize,
+    counts: impl Fn(usize, usize) -> bool,
+) -> Sums {
+    let [cols, rows] = [surface.cols(), surface.rows()];
+    let [across, down] = surface.periodic();
+    let jets = surface.row_space_jets(row).into_iter().enumerate();
+    let known = jets
+        .filter(|(col, jet)| jet.is_regular() && !surface.is_void(*col, row) && counts(*col, row));
+    known.fold(Sums::default(), |sums, (col, jet)| {
+        let area = share(col, cols, across) * share(row, rows, down) * jet.area();
+        let square = area * jet.squared_curvature();
+        let steps = jet.first.map(|step| step.length());
+        sums.add(Sums { area, square, steps, nodes: 1.0 })
+    })
 }
 
 #[cfg(test)]

@@ -194,21 +194,23 @@ impl Knots {
         if !(from < u && u < to) {
             return Err(Error::argument("a new knot", u, format!("between {from} and {to}")));
         }
-        let (span, p) = (self.span(u), self.degree);
+        let span = self.span(u);
         let mut knots = self.knots.clone();
         knots.insert(span + 1, u);
-        let share = |i: usize| {
-            let (low, high) = (self.knots[i], self.knots[(i + p).min(self.knots.len() - 1)]);
-            if i + p <= span {
-                1.0
-            } else if i > span {
-                0.0
-            } else {
-                (u - low) / (high - low)
-            }
-        };
-        let shares = (0..=self.controls()).map(share).collect();
-        Ok((Self::new(p, knots)?, shares))
+        let shares = (0..=self.controls()).map(|i| self.insertion_share(i, u, span)).collect();
+        Ok((Self::new(self.degree, knots)?, shares))
+    }
+
+    /// `α_i` of a knot at `u` in a span, see [`inserted`](Self::inserted).
+    fn insertion_share(&self, i: usize, u: f64, span: usize) -> f64 {
+        let end = i + self.degree;
+        if end <= span {
+            1.0
+        } else if i > span {
+            0.0
+        } else {
+            (u - self.knots[i]) / (self.knots[end] - self.knots[i])
+        }
     }
 
     /// Knots of the parameter `t = c s/(1 + (c − 1) s)`, where `s` and `t` run from 0 to 1 over the domain, and the factors

@@ -242,6 +242,13 @@ impl NurbsSurface {
         })
     }
 
+    /// Whether a patch that is `by` parameters large, with the steps that the surface makes at `u`, has sides longer than `least`.
+    fn has_area(&self, u: DVec2, by: DVec2, least: f64) -> bool {
+        let jet = self.jet(u);
+        let [a, b] = jet.first.map(|s| s.length());
+        jet.is_regular() && a * by.x > least && b * by.y > least
+    }
+
     /// # Errors
     /// A patch between knots without area.
     fn check_patches(&self) -> Result<()> {
@@ -251,14 +258,8 @@ impl NurbsSurface {
         for [from2, to2] in self.knots[1].spans() {
             for [from1, to1] in self.knots[0].spans() {
                 let (from, by) = (DVec2::new(from1, from2), DVec2::new(to1 - from1, to2 - from2));
-                let places = PLACES.iter().flat_map(|&y| PLACES.map(|x| DVec2::new(x, y)));
-                let has_area = |at: DVec2| {
-                    let jet = self.jet(from + at * by);
-                    jet.is_regular()
-                        && jet.first[0].length() * by.x > least
-                        && jet.first[1].length() * by.y > least
-                };
-                if !places.into_iter().any(has_area) {
+                let mut places = PLACES.iter().flat_map(|&y| PLACES.map(|x| DVec2::new(x, y)));
+                if !places.any(|at| self.has_area(from + at * by, by, least)) {
                     return Err(Error::argument(
                         format!(
                             "the area between the knots {from1} and {to1} of the first parameter, {from2} and {to2} of \
