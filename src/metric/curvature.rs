@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::norm::one_by_one;
 use super::{Delta, Metric, MetricOptions, NamedMetric, Norm, SpeedBlock, SpeedTensor, Unit};
 use crate::control::Control;
 use crate::error::Result;
@@ -68,7 +69,7 @@ impl SpeedTensor for CurvatureTensor {
     fn block(&self, block: &Block, jets: &JetBlock, speeds: &mut SpeedBlock) {
         match jets.heights() {
             Some(jets) => simd::dispatch(BlockOfHeights { jets, delta: self.delta, speeds }),
-            None => super::one_by_one(self, block, jets, speeds),
+            None => one_by_one(self, block, jets, speeds),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::norm::one_by_one;
 use super::{Metric, MetricOptions, NamedMetric, Norm, SpeedBlock, SpeedTensor, Unit};
 use crate::control::Control;
 use crate::error::Result;
@@ -51,7 +52,7 @@ impl SpeedTensor for Isotropic {
     fn block(&self, block: &Block, jets: &JetBlock, speeds: &mut SpeedBlock) {
         match jets.heights() {
             Some(jets) => simd::dispatch(BlockOfHeights { jets, speeds }),
-            None => super::one_by_one(self, block, jets, speeds),
+            None => one_by_one(self, block, jets, speeds),
         }
     }
 }
