@@ -10,7 +10,7 @@ use super::schedule::memory::SharedValues;
 use super::schedule::values::Values;
 use super::stencil::UNREACHED;
 use super::stencil::foot;
-use super::stencil::ring::{RING, TRIANGLES, ring_of, rings, without_cut_corners};
+use super::stencil::ring::{RING, for_each_triangle, ring_of, rings, without_cut_corners};
 use super::tensor_field::TensorField;
 use super::tile::coefficients::{Coefficients, LaneLimits, factoring_terms, line_tensors};
 use super::tile::{Block, Tile};
@@ -100,15 +100,14 @@ fn of_line(block: &Block, tile: &Tile<'_>, row: usize) -> [u32; SIDE] {
         for k in 0..8 {
             g[k] += terms[k][i];
         }
-        let (mut value, mut predecessor) = (UNREACHED, u32::from(NOWHERE));
+        let mut best = Best { value: UNREACHED, place: u32::from(NOWHERE) };
         for place in 0..8 {
             let through = g[place] + k.step[place % 4][i];
-            predecessor = if through < value { place as u32 } else { predecessor };
-            value = least(through, value);
+            best.offer(through, place as u32);
         }
         let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
         let yy = (det + xy * xy) / xx;
-        for t in TRIANGLES {
+        for_each_triangle!(t => {
             let (a, b) = (t.a, t.b);
             let through = k.closed_form(t, i).through(g[a], g[b]);
             let (s, q) = if t.along_y { (yy, xx) } else { (xx, yy) };
@@ -117,12 +116,25 @@ fn of_line(block: &Block, tile: &Tile<'_>, row: usize) -> [u32; SIDE] {
             let (a_lower, b_lower) = (ring[a] < own[i], ring[b] < own[i]);
             let to_b = (is_near_b & (b_lower | !a_lower)) | (b_lower & !a_lower);
             let to = if to_b { b as u32 } else { a as u32 };
-            predecessor = if through < value { to } else { predecessor };
-            value = least(through, value);
-        }
-        predecessors[i] = if own[i] < UNREACHED { predecessor } else { u32::from(NOWHERE) };
+            best.offer(through, to);
+        });
+        predecessors[i] = if own[i] < UNREACHED { best.place } else { u32::from(NOWHERE) };
     }
     predecessors
+}
+
+/// The best value so far and the place on the ring that it leads to.
+struct Best {
+    value: f32,
+    place: u32,
+}
+
+impl Best {
+    #[inline(always)]
+    fn offer(&mut self, value: f32, place: u32) {
+        self.place = if value < self.value { place } else { self.place };
+        self.value = least(value, self.value);
+    }
 }
 
 /// `−mᵀMw/‖m‖` in the middle `m` of a segment, with `D = [s β; β q]` as in

@@ -3,9 +3,16 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use super::functional::Quadratic;
-use crate::eikonal::stencil::ring::{TRIANGLES, Triangle, without_cut_corners};
+use crate::eikonal::stencil::ring::{Triangle, for_each_triangle, without_cut_corners};
 use crate::eikonal::stencil::segment::ClosedForm;
 use crate::linalg::lanes::{Mask, choose_bits as choose, greatest, inverse_root};
+
+/// The best triangle so far, as bits, and the difference along its segment.
+struct Best {
+    value: f32,
+    triangle: u32,
+    slope: f32,
+}
 
 /// A [`Triangle`] in a lane.
 #[derive(Clone, Copy)]
@@ -31,10 +38,10 @@ impl LaneTriangle {
     /// The bits of a triangle.
     #[inline(always)]
     fn to_bits(t: Triangle) -> u32 {
-        let bit = |yes: bool, bit: u32| if yes { bit } else { 0 };
-        bit(t.negative, Self::NEGATIVE)
-            | bit(t.along_y, Self::ALONG_Y)
-            | bit(t.falling, Self::FALLING)
+        let negative = if t.negative { Self::NEGATIVE } else { 0 };
+        let along_y = if t.along_y { Self::ALONG_Y } else { 0 };
+        let falling = if t.falling { Self::FALLING } else { 0 };
+        negative | along_y | falling
     }
 
     #[inline(always)]
@@ -98,8 +105,8 @@ impl LaneTriangle {
         let (rising, falling) = (rising2 * inv_rising, falling2 * inv_falling);
         let (inv_east, inv_south) = (inverse_root(xx), inverse_root(yy));
         let ring = without_cut_corners(ring);
-        let (mut least_value, mut triangle, mut slope) = (f32::INFINITY, 0, 0.0);
-        for t in TRIANGLES {
+        let mut best = Best { value: f32::INFINITY, triangle: 0, slope: 0.0 };
+        for_each_triangle!(t => {
             // aᵀMw, wᵀMw and what is 1/‖a‖ and 1/‖w‖.
             let aw = if t.falling { -xy } else { xy };
             let ww = if t.along_y { xx } else { yy };
@@ -118,11 +125,11 @@ impl LaneTriangle {
             let (ga, gb) = (ring[t.a], ring[t.b]);
             let d = gb - ga;
             let value = choose(d < form.lo, gb + step, form.through(ga, gb));
-            let better = value < least_value;
-            least_value = choose(better, value, least_value);
-            slope = choose(better, d, slope);
-            triangle = if better { Self::to_bits(t) } else { triangle };
-        }
-        (triangle, slope)
+            let better = value < best.value;
+            best.value = choose(better, value, best.value);
+            best.slope = choose(better, d, best.slope);
+            best.triangle = if better { Self::to_bits(t) } else { best.triangle };
+        });
+        (best.triangle, best.slope)
     }
 }

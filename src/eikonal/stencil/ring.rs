@@ -48,30 +48,60 @@ pub(crate) const TRIANGLES: [Triangle; 8] = [
     Triangle::new(6, 7),
 ];
 
+/// Does the same with each of the [`TRIANGLES`]. Written out, since the compiler would unroll a loop too late to do many nodes at a time.
+macro_rules! for_each_triangle {
+    ($t:ident => $body:expr) => {
+        for_each_triangle!(@ $t => $body, 0 1 2 3 4 5 6 7)
+    };
+    (@ $t:ident => $body:expr, $($k:literal)*) => {
+        $({
+            let $t = const { $crate::eikonal::stencil::ring::TRIANGLES[$k] };
+            $body
+        })*
+    };
+}
+pub(crate) use for_each_triangle;
+
 /// No corner cutting: the ring without the diagonal neighbours whose step passes between two closed nodes, through which it
 /// would leak.
 #[inline(always)]
-pub(crate) fn without_cut_corners(ring: [f32; 8]) -> [f32; 8] {
-    let mut seen = ring;
-    for axis in [0, 2, 4, 6] {
-        let (diagonal, next) = (axis + 1, (axis + 2) % 8);
-        let is_seen = least(ring[axis], ring[next]) < f32::INFINITY;
-        seen[diagonal] = if is_seen { ring[diagonal] } else { f32::INFINITY };
-    }
-    seen
+pub(crate) fn without_cut_corners([e, se, s, sw, w, nw, n, ne]: [f32; 8]) -> [f32; 8] {
+    [
+        e,
+        unless_cut(se, s, e),
+        s,
+        unless_cut(sw, s, w),
+        w,
+        unless_cut(nw, n, w),
+        n,
+        unless_cut(ne, n, e),
+    ]
+}
+
+/// A diagonal neighbour, hidden where both axis neighbours beside the step to it are closed.
+#[inline(always)]
+fn unless_cut(diagonal: f32, a: f32, b: f32) -> f32 {
+    if least(a, b) < f32::INFINITY { diagonal } else { f32::INFINITY }
 }
 
 /// The rings of [`LANES`](crate::linalg::lanes::LANES) nodes side by side, place by place: those of the middle one of three lines, from
 /// the one at `first` on.
 #[inline(always)]
-pub(crate) fn rings<const N: usize>(lines: [&[f32; N]; 3], first: usize) -> [Lanes; 8] {
-    let mut rings = [[0.0; 16]; 8];
-    for k in 0..8 {
-        let (dx, dy) = RING[k];
-        let line = lines[(1 + dy) as usize];
-        rings[k] = lanes(line, (first as i32 + dx) as usize);
-    }
-    rings
+pub(crate) fn rings<const N: usize>(
+    [above, here, below]: [&[f32; N]; 3],
+    first: usize,
+) -> [Lanes; 8] {
+    let (before, behind) = (first - 1, first + 1);
+    [
+        lanes(here, behind),
+        lanes(below, behind),
+        lanes(below, first),
+        lanes(below, before),
+        lanes(here, before),
+        lanes(above, before),
+        lanes(above, first),
+        lanes(above, behind),
+    ]
 }
 
 /// The ring of one of them.

@@ -6,7 +6,7 @@ use glam::{DVec2, Vec2Swizzles as _};
 
 use super::{Limits, Tile};
 use crate::eikonal::stencil::UNREACHED;
-use crate::eikonal::stencil::ring::{TRIANGLES, Triangle};
+use crate::eikonal::stencil::ring::{Triangle, for_each_triangle};
 use crate::eikonal::stencil::segment::ClosedForm;
 use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
@@ -39,6 +39,31 @@ struct Along {
     lo_falling: Lanes,
 }
 
+impl Along {
+    /// Sets what node `i` needs, from `s`, `1/s` and `1/q`, from `β` and `det D`, the length of `a`, and lengths of the diagonals with their inverses over `det D`. By
+    /// how much the least over a segment may lie below an end: see [`Limits::margin`].
+    #[inline(always)]
+    fn set(
+        &mut self,
+        i: usize,
+        open: bool,
+        [s, inv_s, inv_q]: [f32; 3],
+        [beta, det]: [f32; 2],
+        length_of_a: f32,
+        [rising, inv_rising, falling, inv_falling]: [f32; 4],
+    ) -> f32 {
+        let hi = beta * length_of_a * inv_q;
+        let (lo_rising, lo_falling) = ((beta - s) * inv_rising, -(s + beta) * inv_falling);
+        self.inv_s[i] = choose(open, inv_s, f32::INFINITY);
+        self.det_over_s2[i] = choose(open, det * inv_s * inv_s, 0.0);
+        self.beta_over_s[i] = choose(open, beta * inv_s, 0.0);
+        self.hi[i] = choose(open, hi, 0.0);
+        self.lo_rising[i] = choose(open, lo_rising, 0.0);
+        self.lo_falling[i] = choose(open, lo_falling, 0.0);
+        greatest(hi.abs() - length_of_a, greatest(-lo_rising - rising, -lo_falling - falling))
+    }
+}
+
 /// The speed tensors of a line of nodes: `xx`, `xy` and the determinant, 0 where closed. `xx·yy − xy²` would lose the determinant of a very
 /// anisotropic tensor in rounding.
 pub(crate) type LineTensors = [Lanes; 3];
@@ -69,6 +94,7 @@ impl Coefficients {
         limits: &mut LaneLimits,
     ) {
         let (mut obtuse, mut longest) = ([0f32; SIDE], [0f32; SIDE]);
+        let tolerance = tile.tolerance;
         for i in 0..SIDE {
             let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
             let open = det > 0.0;
@@ -80,30 +106,20 @@ impl Coefficients {
             let rising = (greatest(xx + yy - 2.0 * xy, 1e-30) * inv_det).sqrt();
             let falling = (greatest(xx + yy + 2.0 * xy, 1e-30) * inv_det).sqrt();
             let (inv_rising, inv_falling) = (inv_det / rising, inv_det / falling);
-            let steps = [east, rising, south, falling];
-            for k in 0..4 {
-                self.step[k][i] = choose(open, steps[k], f32::INFINITY);
-            }
-            for axis in 0..2 {
-                let (s, inv_s) = ([xx, yy][axis], [inv_xx, inv_yy][axis]);
-                let (inv_q, length_of_a) = ([inv_yy, inv_xx][axis], [east, south][axis]);
-                let along = &mut self.along[axis];
-                along.inv_s[i] = choose(open, inv_s, f32::INFINITY);
-                along.det_over_s2[i] = choose(open, det * inv_s * inv_s, 0.0);
-                along.beta_over_s[i] = choose(open, xy * inv_s, 0.0);
-                along.hi[i] = choose(open, xy * length_of_a * inv_q, 0.0);
-                along.lo_rising[i] = choose(open, (xy - s) * inv_rising, 0.0);
-                along.lo_falling[i] = choose(open, -(s + xy) * inv_falling, 0.0);
-                // By how much the least over a segment may lie below an end: see `Limits::margin`.
-                obtuse[i] = greatest(obtuse[i], along.hi[i].abs() - length_of_a);
-                obtuse[i] = greatest(obtuse[i], -along.lo_rising[i] - rising);
-                obtuse[i] = greatest(obtuse[i], -along.lo_falling[i] - falling);
-            }
+            let [step_east, step_rising, step_south, step_falling] = &mut self.step;
+            step_east[i] = choose(open, east, f32::INFINITY);
+            step_rising[i] = choose(open, rising, f32::INFINITY);
+            step_south[i] = choose(open, south, f32::INFINITY);
+            step_falling[i] = choose(open, falling, f32::INFINITY);
+            let [along_x, along_y] = &mut self.along;
+            let diagonals = [rising, inv_rising, falling, inv_falling];
+            let obtuse_x = along_x.set(i, open, [xx, inv_xx, inv_yy], [xy, det], east, diagonals);
+            let obtuse_y = along_y.set(i, open, [yy, inv_yy, inv_xx], [xy, det], south, diagonals);
+            obtuse[i] = choose(open, greatest(obtuse_x, obtuse_y), 0.0);
             let shortest = least(least(east, south), least(rising, falling));
-            self.tolerance[i] = choose(open, tile.tolerance * shortest, f32::INFINITY);
+            self.tolerance[i] = choose(open, tolerance * shortest, f32::INFINITY);
             // A closed node never changes: at the seam of a periodic grid it stands for one of another tile.
             self.ceiling[i] = choose(open, f32::INFINITY, f32::NEG_INFINITY);
-            obtuse[i] = choose(open, obtuse[i], 0.0);
             longest[i] = choose(open, greatest(rising, falling), 0.0);
         }
         // In a loop of its own, or the limits are scattered lane by lane.
@@ -114,8 +130,8 @@ impl Coefficients {
         let Some(seeds) = tile.seeds else { return };
         for i in 0..SIDE {
             let place = if by_columns { i * SIDE + line } else { line * SIDE + i };
-            let [east, rising, south, falling] = [0, 1, 2, 3].map(|k| self.step[k][i]);
-            let shortest = least(least(east, south), least(rising, falling));
+            let [east, rising, south, falling] = &self.step;
+            let shortest = least(least(east[i], south[i]), least(rising[i], falling[i]));
             self.ceiling[i] = least(self.ceiling[i], ceiling(seeds[place], shortest));
         }
     }
@@ -137,13 +153,13 @@ impl Coefficients {
     /// The best value of node `i` over its ring: over the eight nodes, and between them over the eight segments.
     #[inline(always)]
     pub(crate) fn best(&self, ring: [f32; 8], i: usize) -> f32 {
-        let mut best = f32::INFINITY;
-        for k in 0..4 {
-            best = least(best, least(ring[k], ring[k + 4]) + self.step[k][i]);
-        }
-        for t in TRIANGLES {
-            best = least(best, self.closed_form(t, i).through(ring[t.a], ring[t.b]));
-        }
+        let [e, se, s, sw, w, nw, n, ne] = ring;
+        let [east, rising, south, falling] = &self.step;
+        let mut best = least(
+            least(least(e, w) + east[i], least(s, n) + south[i]),
+            least(least(se, nw) + rising[i], least(ne, sw) + falling[i]),
+        );
+        for_each_triangle!(t => best = least(best, self.closed_form(t, i).through(ring[t.a], ring[t.b])));
         best
     }
 

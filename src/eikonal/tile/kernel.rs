@@ -262,8 +262,8 @@ impl Workspace {
             dirty &= !(1 << row);
             prepared.prepare::<IS_FACTORED>(tile, row, by_columns, limits);
             let Prepared { lines, terms, .. } = &*prepared;
-            let terms = if IS_FACTORED { Some(&terms[row]) } else { None };
-            if update_line(update, values, row, &lines[row], terms, &mut changed) {
+            let (line, terms) = (&lines[row], &terms[row]);
+            if update_line::<IS_FACTORED>(update, values, row, line, terms, &mut changed) {
                 dirty |= around(row);
             }
         }
@@ -299,12 +299,12 @@ impl Prepared {
 
 /// Updates the nodes of a row; sets the bits of those that changed and says if any did.
 #[inline(always)]
-fn update_line(
+fn update_line<const IS_FACTORED: bool>(
     update: &impl Update,
     values: &mut Block,
     row: usize,
     coefficients: &Coefficients,
-    terms: Option<&[Lanes; 8]>,
+    terms: &[Lanes; 8],
     changed: &mut [u32; SIDE],
 ) -> bool {
     let rings = rings([&values[row], &values[row + 1], &values[row + 2]], 1);
@@ -313,7 +313,7 @@ fn update_line(
     let mut any = 0;
     for i in 0..SIDE {
         let mut ring = without_cut_corners(ring_of(&rings, i));
-        if let Some(terms) = terms {
+        if IS_FACTORED {
             for k in 0..8 {
                 ring[k] += terms[k][i];
             }
