@@ -29,7 +29,7 @@ pub(crate) struct Factors {
     tiling: Tiling,
     factors: Vec<Factor>,
     /// Index of the tile's factor plus one; 0 if it has none. Empty if the factors are those of one point: which is the tile's is
-    /// then quickly told.
+    /// then quickly found.
     of_tile: Vec<u32>,
 }
 
@@ -50,7 +50,7 @@ impl Factors {
                 .collect::<Vec<_>>()
         };
         let tiling = field.tiling;
-        // Nothing fans out from a corner outside the grid: no way leads there.
+        // Nothing fans out from a corner outside the grid: no path leads there.
         let inside = |factor: &Factor| tiling.contains(factor.at);
         let mut factors: Vec<Factor> = starts.iter().flat_map(of_start).filter(inside).collect();
         let radius = RADIUS * (tiling.cols.max(tiling.rows) - 1) as f64;
@@ -113,7 +113,7 @@ impl Factors {
         self.at_node(field, col, row).map_or([0.0; 8], |(_, _, terms)| terms)
     }
 
-    /// The factor that is taken out at a node, the way to the node from its point, and the terms.
+    /// The factor that is taken out at a node, the vector to the node from its point, and the terms.
     pub(crate) fn at_node(
         &self,
         field: &TensorField,
@@ -139,7 +139,7 @@ fn nearest(factors: &[Factor], tiling: &Tiling, tile: usize) -> u32 {
     if factors[index].gap(tiling, tile).length() > radius {
         return 0;
     }
-    // The places of one factor are convex where all are alike: the corners tell.
+    // The places of one factor are convex where all are alike: the corners are enough.
     let is_same = |x: f64, y: f64| {
         let corner = middle + DVec2::new(x, y) * (half + 1.0);
         factors[nearest_to(factors, corner)].number == number
@@ -187,7 +187,7 @@ impl Factor {
         ((self.at - tiling.first(tile) - half).abs() - half).max(DVec2::ZERO)
     }
 
-    /// How far in cells from the point a way of `length`, in stored units, can lead while all ground is like that of the point, a node on
+    /// How far in cells from the point a path of `length`, in stored units, can lead while all ground is like that of the point, a node on
     /// either side included.
     fn extent(&self, length: f64) -> f64 {
         let d = self.metric.inverse();

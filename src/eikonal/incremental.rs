@@ -29,8 +29,8 @@ impl Solver {
     /// The outcome is that of a solve from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was done.
     ///
     /// Costs the sampling of the metric and a comparison of all tensors; [`update_nodes`](Self::update_nodes) costs
-    /// neither. All is solved again where the ground around a start changed so that another cone fans out from it, or next to a
-    /// start that another way passes over.
+    /// neither. All is solved again where the ground around a start changed so that another factor is taken out there, or next to a
+    /// start that another path passes over.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -167,7 +167,7 @@ fn moved_seeds<'a>(
     })
 }
 
-/// The tiles in and beside which a start is passed over by a quicker way, with how many nodes of each have a value.
+/// The tiles in and beside which a start is passed over by a quicker path, with how many nodes of each have a value.
 ///
 /// Such a node jumps down from its own value, see [`ceiling`](super::tile::coefficients::ceiling). On obtuse metrics it may then hold up the very nodes
 /// that brought it down, so that what it came from must not be taken away alone.

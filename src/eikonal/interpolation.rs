@@ -7,7 +7,7 @@ use super::source::{self, sees};
 use super::stencil::factoring::Factor;
 use crate::linalg::bilinear::{CORNERS, corner_weights};
 
-/// Within this many cells of the start the straight way to it is considered.
+/// Within this many cells of the start the straight path to it is considered.
 const SEED_SIGHT: f64 = 4.0;
 /// The values of nodes are rounded to `f32`.
 pub(super) const ROUNDED_UP: f64 = 1.0 + 1e-6;
@@ -15,7 +15,7 @@ pub(super) const ROUNDED_UP: f64 = 1.0 + 1e-6;
 impl DistanceMap {
     /// Distance at grid coordinates; `None` outside the grid and where not reached.
     ///
-    /// Near the start the length of the straight way; elsewhere cubic between the nodes where all around are
+    /// Near the start the length of the straight path; elsewhere cubic between the nodes where all around are
     /// reached, bilinear in a cell with four reached corners, and the solver's own update beside walls.
     #[must_use]
     pub fn at(&self, at: DVec2) -> Option<f64> {
@@ -30,13 +30,13 @@ impl DistanceMap {
         Some(value / self.field.root_scale())
     }
 
-    /// The point of the start region to go to straight from `at`, if that is the shortest way.
+    /// The point of the start region to go to straight from `at`, if that is the shortest path.
     pub(crate) fn straight_home(&self, at: DVec2, value: f64) -> Option<DVec2> {
         let (foot, length) = self.straight(at)?;
         (length <= ROUNDED_UP * value).then_some(foot)
     }
 
-    /// The nearest point of the start in sight and the length of the way to it.
+    /// The nearest point of the start in sight and the length of the path to it.
     fn straight(&self, at: DVec2) -> Option<(DVec2, f64)> {
         source::foot_on_any(&self.starts, &self.field, at, SEED_SIGHT)
     }

@@ -1,4 +1,4 @@
-//! Start values: at the nodes on and near points, lines and areas, and the way back to these.
+//! Start values: at the nodes on and near points, lines and areas, and the path back to these.
 
 use std::array::from_fn;
 
@@ -202,7 +202,7 @@ fn near(
     }
 }
 
-/// Length of the straight way from `a` to `b` in stored units, by Simpson's rule with five points; `None` where a
+/// Length of the straight path from `a` to `b` in stored units, by Simpson's rule with five points; `None` where a
 /// wall is in the way.
 fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
     if !sees(field, a, b) {

@@ -189,7 +189,7 @@ impl GridFrame {
         self.step * self.ground.metres_per_unit(self.origin.y - row * self.step.y)
     }
 
-    /// [`spacing`](Self::spacing) in the middle of the grid: the cell size to tell people.
+    /// [`spacing`](Self::spacing) in the middle of the grid: the cell size to show to people.
     #[must_use]
     pub fn mid_spacing(&self) -> DVec2 {
         self.spacing((self.rows - 1) as f64 / 2.0)

@@ -16,7 +16,7 @@ pub(crate) fn in_sight(a: DVec2, b: DVec2, is_open: impl Fn(isize, isize) -> boo
     })
 }
 
-/// In a cell with closed corners: whether the way stays on the side of its own end's corner.
+/// In a cell with closed corners: whether the segment stays on the side of its own end's corner.
 fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) -> bool {
     // The nearest corner, or one of the nearest, must be open, ...
     let distance = |i: usize| at.distance_squared(DVec2::new((i % 2) as f64, (i / 2) as f64));
@@ -24,7 +24,7 @@ fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) 
     if !(0..4).any(|i| corners[i] && distance(i) <= nearest + 1e-9) {
         return false;
     }
-    // ... and where a wall runs along a diagonal, the whole way must lie on one side of it.
+    // ... and where a wall runs along a diagonal, the whole segment must lie on one side of it.
     let side = |p: DVec2, rising: bool| {
         let q = p - cell;
         if rising { q.x - q.y } else { q.x + q.y - 1.0 }

@@ -153,7 +153,7 @@ pub struct NamedMetric {
     make: fn(&MetricOptions) -> Result<Box<dyn Metric>>,
 }
 
-/// What the named metrics can be told; each looks at what concerns it.
+/// Parameters of the named metrics; each takes those that concern it.
 #[derive(Clone, Debug, Default)]
 pub struct MetricOptions {
     /// `δ` of the curvature tensor. Default: that of the metric.

@@ -1,8 +1,8 @@
-//! A question and its answer: which way, from where to where, over which ground.
+//! A question and its answer: which route, from where to where, over which ground.
 //!
 //! A [`Question`] names files, places and options; nothing is read yet. On the terrain it becomes a [`Scenario`]: the
 //! surface, the places on the grid, and what closes ground or makes it costly. A scenario is asked for distances, routes and
-//! comparisons under any metric. The command line, a server and other languages all ask in this way; what they tell is a report (data
+//! comparisons under any metric. The command line, a server and other languages all ask like this; what they show is a report (data
 //! for [`serde`]) with its [`Provenance`].
 //!
 //! In one call:

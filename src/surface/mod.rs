@@ -2,7 +2,7 @@
 //!
 //! [`Surface`] is all that metrics, routes and regions ask of one. [`HeightSurface`] fits a tensor-product B-spline (`bspline/`)
 //! to the heights of a terrain; [`NurbsGrid`] is a [`NurbsSurface`] of any form with nodes. A user's own needs three
-//! methods: how many columns and rows, and the [`Jet`] at a point. `curvature` says what the derivatives tell of the shape.
+//! methods: how many columns and rows, and the [`Jet`] at a point. `curvature` says what the derivatives say of the shape.
 
 mod block;
 mod bspline;

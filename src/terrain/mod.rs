@@ -1,7 +1,7 @@
 //! A file becomes heights in metres on a frame.
 //!
 //! ```text
-//! file ──▶ a format tells itself ──▶ raster ──▶ terrain: metres, NaN for voids, row 0 in the north
+//! file ──▶ a format is recognised ──▶ raster ──▶ terrain: metres, NaN for voids, row 0 in the north
 //!          by content, then by name   as stored
 //! ```
 //!

@@ -27,7 +27,7 @@ Places (--start, --goal):
   pixel:COL,ROW      cells from the north-west corner; 0,0 is the centre of the first one
   FILE.geojson       points; for --start also lines and areas, every point of which is a start
 
-Exit codes: 0 done, 1 no way between start and goal, 2 wrong use or bad input, 3 reading or writing
+Exit codes: 0 done, 1 no path between start and goal, 2 wrong use or bad input, 3 reading or writing
 failed, 130 cancelled.";
 
 /// Plans routes over terrain by anisotropic geodesic distance.

@@ -116,7 +116,7 @@ impl<S: TileStore> Schedule<S> {
     }
 
     /// Solves the tiles that wait and those that their changes activate, in rounds, until `stop` allows to end. Before
-    /// a round `open` is told its jobs.
+    /// a round `open` is given its jobs.
     ///
     /// # Errors
     /// [`Error::NotConverged`]; those of the store; cancelled.

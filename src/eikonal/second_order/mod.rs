@@ -1,6 +1,6 @@
 //! Second order by deferred correction.
 //!
-//! The first-order distance `g` tells where each node's value comes from: a point between two neighbours `a` and `b`, its
+//! The first-order distance `g` shows where each node's value comes from: a point between two neighbours `a` and `b`, its
 //! foot. There a functional of second order is evaluated,
 //!
 //! ```text
@@ -99,7 +99,7 @@ impl Correction {
         total.par_iter_mut().zip(&first).enumerate().for_each(|(tile, (total, first))| {
             let values = values.tile(tile);
             for i in 0..AREA {
-                // On ground so rough that the transport does not settle no distance is to be negative either.
+                // On ground so rough that the transport does not converge no distance is to be negative either.
                 total[i] = greatest(total[i] + first[i], -values[i]);
             }
         });

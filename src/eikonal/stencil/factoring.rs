@@ -76,7 +76,7 @@ impl Factor {
         near && self.metric == other.metric && self.sides == other.sides
     }
 
-    /// The factoring terms at a node, given its `D` and the way to it from the point; `None` where `g0` is not taken out.
+    /// The factoring terms at a node, given its `D` and the vector to it from the point; `None` where `g0` is not taken out.
     pub(crate) fn terms(&self, v: DVec2, d: Sym2) -> Option<[f64; 8]> {
         let terms = RING.map(|(i, j)| {
             let by = DVec2::new(i.into(), j.into());
@@ -96,7 +96,7 @@ impl Factor {
         (self.holds(v) && is_near && applies).then_some(terms)
     }
 
-    /// The terms at a line of nodes along x, given the way to the first from the point and `D` as xx, xy and the determinant: 0 where
+    /// The terms at a line of nodes along x, given the vector to the first from the point and `D` as xx, xy and the determinant: 0 where
     /// `g0` is not taken out. Also by how much each lowers a neighbour at most.
     #[inline(always)]
     pub(crate) fn terms_of_line(

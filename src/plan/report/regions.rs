@@ -23,7 +23,7 @@ pub struct SegmentReport {
     pub provenance: Provenance,
 }
 
-/// A region, as a file tells it: numbers count from 1.
+/// A region, as it stands in a file: numbers count from 1.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RegionRecord {
     /// Its level.
@@ -38,7 +38,7 @@ pub struct RegionRecord {
     pub epsilon_unit: Unit,
     /// Map coordinates of its seed.
     pub seed: [f64; 2],
-    /// Eigenvalues that tell its shape.
+    /// Eigenvalues that describe its shape.
     pub signature: [f64; 4],
     /// What it is like.
     #[serde(flatten)]
@@ -99,7 +99,7 @@ pub struct MatchedRegion {
     pub seed: Vec<f64>,
     /// Its size `√area` in metres.
     pub size_m: f64,
-    /// Eigenvalues that tell its shape.
+    /// Eigenvalues that describe its shape.
     pub signature: [f64; 4],
 }
 

@@ -40,7 +40,7 @@ const MOST_STEPS: usize = 40;
 /// with up to 200, costs that jump by 1 : 10 with 70 to 3000, by 1 : 50 with 27 000.
 const JUMP: f64 = 1e3;
 
-/// The line, nowhere longer than `line`, between the same ends. `metric` is `M` in grid coordinates; `clear` tells
+/// The line, nowhere longer than `line`, between the same ends. `metric` is `M` in grid coordinates; `clear` says
 /// whether one may go straight from one point to another nearby.
 pub(super) fn polish(
     line: &[DVec2],

@@ -5,7 +5,7 @@ use super::wkt::{geographic_code, utm_code, wkt_authority, wkt_ellipsoid, wkt_na
 use crate::error::{Error, Result};
 
 impl Crs {
-    /// The CRS of well-known text, as in a `.prj` file: by its EPSG code, by a name that tells one, or else by
+    /// The CRS of well-known text, as in a `.prj` file: by its EPSG code, by a name that says one, or else by
     /// its ellipsoid or unit only.
     pub(in crate::terrain) fn from_wkt(wkt: &str) -> Result<Self> {
         let (name, wkt) = (wkt_name(wkt), wkt.trim_start());

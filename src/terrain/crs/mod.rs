@@ -1,4 +1,4 @@
-//! Coordinate reference systems: which one a file is in, and the way to longitude and latitude.
+//! Coordinate reference systems: which one a file is in, and how it leads to longitude and latitude.
 //!
 //! Projections are those of [`proj4rs`], definitions those of [`crs_definitions`] (the EPSG data set in PROJ.4
 //! notation). Datum shifts are three- or seven-parameter ones; grid files are not at hand, and where that

@@ -13,7 +13,7 @@ pub(super) struct Format {
     pub(super) is_own: fn(&Head) -> bool,
     /// Lower-case extensions of files that are taken for this format where nothing else is known of them.
     pub(super) extensions: &'static [&'static str],
-    /// Reads a file whose content is given; the path is for messages, for files beside, and where the name tells the place.
+    /// Reads a file whose content is given; the path is for messages, for files beside, and where the name says the place.
     pub(super) read: fn(&Path, &[u8], ReadMode) -> Result<Raster>,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct Head<'a> {
 }
 
 impl<'a> Head<'a> {
-    /// Bytes that suffice to tell a format.
+    /// Bytes that suffice to recognise a format.
     pub(super) const LENGTH: u64 = 512;
 
     pub(super) fn new(path: &Path, bytes: &'a [u8]) -> Self {

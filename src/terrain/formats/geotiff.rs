@@ -176,7 +176,7 @@ fn rotated<T>() -> TiffResult<T> {
     )
 }
 
-/// The place that the tags tell, else a world file, else none: cells of 1 × 1 at the origin.
+/// The place that the tags give, else a world file, else none: cells of 1 × 1 at the origin.
 fn place(
     path: &Path,
     image: &Directory,
