@@ -297,7 +297,11 @@ fn a_tensor_raster_measures_as_its_tensor_says() {
     let ratio = distance("--cost cost.tif --metric isotropic") / distance("--metric isotropic");
     assert!((ratio / slope - 1.0).abs() < 1e-4, "{ratio} {slope}");
     let line = "distance plane.tif --start pixel:5,5 --cost";
-    folder.bad(&format!("{line} tensor.tif"), 2, "tensor.tif: has 3 bands; a cost raster has one");
+    folder.bad(
+        &format!("{line} tensor.tif"),
+        2,
+        "tensor.tif: the number of bands is 3; it must be 1 for costs",
+    );
     let cells = "1 ".repeat(41 * 31 - 1);
     folder.write(
         "far.asc",
@@ -419,12 +423,12 @@ fn bad_input_is_named() {
     folder.bad(
         "route range.tif --start empty.geojson --goal pixel:3,4",
         2,
-        "empty.geojson: holds no points, lines or areas",
+        "empty.geojson: the number of points, lines and areas is 0; it must be 1 or more",
     );
     folder.bad(
         "route range.tif --start pixel:3,3 --goal pixel:3,4 --tensor range.tif",
         2,
-        "range.tif: has 1 band; a tensor raster has three: D11, D12, D22",
+        "range.tif: the number of bands is 1; it must be 3 for tensors: D11, D12, D22",
     );
     folder.bad(
         "route plain.tif --start huts.geojson --goal pixel:3,4",
@@ -853,7 +857,7 @@ fn every_command_names_the_file_it_cannot_read() {
     folder.bad(
         &format!("route range.tif {places} --barrier empty.geojson"),
         2,
-        "empty.geojson: the file is empty",
+        "empty.geojson: the file is empty; it must be GeoJSON",
     );
 }
 

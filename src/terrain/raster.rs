@@ -64,7 +64,7 @@ impl Raster {
     /// Turns the rows so that the first is the northernmost, and gives the frame.
     pub(super) fn turn_north_up(&mut self, path: &Path) -> Result<GridFrame> {
         if self.step.x < 0.0 {
-            return Err(Error::unsupported_file(
+            return Err(Error::unsupported(
                 path,
                 "the columns run from east to west",
                 "turn the raster with `gdalwarp IN OUT.tif`",

@@ -43,11 +43,11 @@ pub(super) fn refuse_stand_in(path: &Path, head: &Head) -> Result<()> {
 pub(super) fn refuse_known(path: &Path, head: &Head) -> Result<()> {
     if let Some((_, found, advice)) = MAGIC.iter().find(|(magic, ..)| head.bytes.starts_with(magic))
     {
-        return Err(Error::unsupported_file(path, *found, *advice));
+        return Err(Error::unsupported(path, *found, *advice));
     }
     if EXTENSIONS.contains(&head.extension.as_str()) {
         let found = format!("a .{} file, not read yet", head.extension);
-        return Err(Error::unsupported_file(path, found, CONVERT));
+        return Err(Error::unsupported(path, found, CONVERT));
     }
     Ok(())
 }

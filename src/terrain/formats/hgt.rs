@@ -133,7 +133,7 @@ fn unzip(path: &Path, _: &[u8]) -> Result<Vec<u8>> {
 }
 
 fn unpack_first(path: &Path, found: &str) -> Error {
-    Error::unsupported_file(path, found, "unpack it first")
+    Error::unsupported(path, found, "unpack it first")
 }
 
 /// Unpacks to the size of the largest tile and a byte more, whatever the archive claims.

@@ -33,7 +33,7 @@ impl TiffError {
     pub(crate) fn in_file(self, path: &Path) -> Error {
         match self {
             Self::Damaged(error) => error.in_file(path),
-            Self::Unsupported { found, advice } => Error::unsupported_file(path, found, advice),
+            Self::Unsupported { found, advice } => Error::unsupported(path, found, advice),
             Self::Crs(error) => error.unsupported_in(path),
             Self::TooLarge { bytes } => Error::TooLarge {
                 what: format!("a band of {}", path.display()),

@@ -9,11 +9,16 @@
 //! assert_eq!(mismatch.at, Some(Location::Node { col: 3, row: 4 }));
 //! ```
 
+mod mismatch;
+mod place;
+
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use glam::{DVec2, DVec3};
+use self::mismatch::at_clause;
+pub use self::mismatch::{Location, Mismatch};
+pub use self::place::{Obstacle, PlaceError, PlaceErrorKind, Role};
 
 /// `Result` with the crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
@@ -63,7 +68,7 @@ pub enum Error {
     /// The distance does not converge: the tensors of the metric are too extreme.
     #[error(
         "the distance has not converged after {activations} activations of tiles{}; the tensors of the metric are too extreme",
-        at_clause(at)
+        at_clause(*at)
     )]
     NotConverged {
         /// How often a tile was solved before the solver gave up.
@@ -92,114 +97,6 @@ pub enum Error {
     /// The work was cancelled through a [`CancelToken`](crate::CancelToken).
     #[error("cancelled")]
     Cancelled,
-    /// Gives way to [`Error::Argument`].
-    #[doc(hidden)]
-    #[error("{0}")]
-    Usage(String),
-    /// Gives way to [`Error::NoPath`].
-    #[doc(hidden)]
-    #[error("{0}")]
-    NoWay(String),
-}
-
-/// Something that is not as it must be: `what`, at a place, is `found` and must be `expected`.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Mismatch {
-    /// The thing: a noun in the singular with its article, such as `the climb weight`.
-    pub what: String,
-    /// Where it stands.
-    pub at: Option<Location>,
-    /// What it is.
-    pub found: String,
-    /// What it must be; `None` if that goes without saying, as of a damaged archive.
-    pub expected: Option<String>,
-    /// What to do, where that is known.
-    pub advice: Option<String>,
-}
-
-/// A start or a goal that cannot be used.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlaceError {
-    /// What the place is for.
-    pub role: Role,
-    /// The place as it was given, such as `pixel:3,4`.
-    pub name: String,
-    /// What is wrong with it.
-    pub kind: PlaceErrorKind,
-    /// The nearest place that would do, written in the same way; `None` if there is none, or it makes no sense to look for one.
-    pub nearest: Option<String>,
-}
-
-/// What a place is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// Paths begin there.
-    Start,
-    /// Paths end there.
-    Goal,
-}
-
-/// What is wrong with a place.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum PlaceErrorKind {
-    /// It lies outside the DEM.
-    Outside {
-        /// The first corner of the DEM: south-west, or of pixels north-west.
-        from: String,
-        /// The opposite corner.
-        to: String,
-        /// What its two numbers are called, and the place with the two swapped, if that lies on the DEM.
-        swapped: Option<(&'static str, String)>,
-    },
-    /// It lies on a void.
-    Void,
-    /// It lies on a barrier.
-    Barrier,
-    /// The metric lets nobody enter because of these; if none, because it is too extreme there.
-    Closed(Vec<Obstacle>),
-    /// It is a file with lines or areas where points are needed.
-    NotPoints,
-    /// It is a file whose lines and areas touch no open cell of the DEM.
-    OffGround,
-}
-
-/// Where in an input something stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Location {
-    /// A node of the grid, counted from the north-west one.
-    Node {
-        /// Column.
-        col: usize,
-        /// Row.
-        row: usize,
-    },
-    /// Grid coordinates, `(column, row)`.
-    Grid(DVec2),
-    /// Map coordinates, `(x, y)`.
-    Map(DVec2),
-    /// A point in space, in metres.
-    Space(DVec3),
-    /// A line of a text, counted from 1.
-    Line(usize),
-    /// A byte of a file, counted from 0.
-    Byte(u64),
-}
-
-/// What closes places to every path.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Obstacle {
-    /// Cells without a height.
-    Void,
-    /// Barriers.
-    Barrier,
-    /// Ground steeper than the limit.
-    Slope,
-    /// Places at which a raster gives no cost or no tensor.
-    NoValue,
 }
 
 impl Error {
@@ -231,7 +128,7 @@ impl Error {
     }
 
     /// An [`Error::Unsupported`]: the file holds `found`; `advice` says how to make one that can be read.
-    pub fn unsupported_file(
+    pub fn unsupported(
         path: impl AsRef<Path>,
         found: impl Into<String>,
         advice: impl Into<String>,
@@ -280,7 +177,6 @@ impl Error {
             Self::Argument(mismatch) => {
                 Self::Format { path: path.as_ref().to_path_buf(), mismatch }
             }
-            Self::Usage(message) => Self::format(path, message),
             other => other,
         }
     }
@@ -292,147 +188,15 @@ impl Error {
         match self {
             Self::Argument(mismatch) => {
                 let (found, advice) = mismatch.clauses();
-                Self::unsupported_file(path, found, advice)
+                Self::unsupported(path, found, advice)
             }
-            Self::Usage(message) => Self::unsupported(path, message),
             other => other,
         }
-    }
-
-    #[doc(hidden)]
-    pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
-        Self::Argument(Box::new(Mismatch {
-            what: message.into(),
-            at: None,
-            found: String::new(),
-            expected: None,
-            advice: None,
-        }))
-        .in_file(path)
-    }
-
-    #[doc(hidden)]
-    pub fn unsupported(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
-        Self::unsupported_file(path, message, "")
-    }
-
-    #[doc(hidden)]
-    pub fn usage(message: impl Into<String>) -> Self {
-        Self::Usage(message.into())
-    }
-}
-
-impl Mismatch {
-    /// What is found, and what it must be and what to do.
-    fn clauses(&self) -> (String, String) {
-        let mut found = format!("{}{}", self.what, at_clause(&self.at));
-        if !self.found.is_empty() {
-            found += &format!(" is {}", self.found);
-        }
-        let expected = self.expected.iter().map(|expected| format!("it must be {expected}"));
-        let advice: Vec<_> = expected.chain(self.advice.clone()).collect();
-        (found, advice.join("; "))
-    }
-}
-
-impl fmt::Display for Mismatch {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (found, advice) = self.clauses();
-        write!(f, "{found}{}", clause(&advice))
-    }
-}
-
-impl PlaceError {
-    /// What is wrong with the place, and where a better one is: the predicate of a sentence about it.
-    #[must_use]
-    pub fn reason(&self) -> String {
-        let Self { kind, nearest, .. } = self;
-        let advice = match (kind, nearest) {
-            (PlaceErrorKind::NotPoints | PlaceErrorKind::OffGround, _)
-            | (PlaceErrorKind::Outside { swapped: Some(_), .. }, _)
-            | (PlaceErrorKind::Outside { .. }, None) => String::new(),
-            (PlaceErrorKind::Outside { .. }, Some(near)) => {
-                format!("; the nearest place on it is {near}")
-            }
-            (_, Some(near)) => format!("; the nearest good place is {near}"),
-            (_, None) => ", and so does every other cell".to_owned(),
-        };
-        format!("{kind}{advice}")
-    }
-}
-
-impl fmt::Display for PlaceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the {} {} {}", self.role, self.name, self.reason())
-    }
-}
-
-impl fmt::Display for Role {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Start => "start",
-            Self::Goal => "goal",
-        })
-    }
-}
-
-impl fmt::Display for PlaceErrorKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Outside { from, to, swapped } => {
-                write!(f, "lies outside the DEM, which reaches from {from} to {to}")?;
-                match swapped {
-                    Some((axes, place)) => write!(f, "; {axes} look swapped: try {place}"),
-                    None => Ok(()),
-                }
-            }
-            Self::Void => f.write_str("lies on a void of the DEM"),
-            Self::Barrier => f.write_str("lies on a barrier"),
-            Self::Closed(by) if by.is_empty() => {
-                f.write_str("lies where the metric is too extreme to compute with")
-            }
-            Self::Closed(by) => {
-                let by: Vec<_> = by.iter().map(Obstacle::to_string).collect();
-                write!(f, "lies where the metric lets nobody enter: {}", by.join(", "))
-            }
-            Self::NotPoints => f.write_str("holds lines or areas; only points will do"),
-            Self::OffGround => f.write_str(
-                "touches no open cell of the DEM; the file must be in longitude and latitude (RFC 7946) and overlap the DEM",
-            ),
-        }
-    }
-}
-
-impl fmt::Display for Location {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Node { col, row } => write!(f, "column {col}, row {row}"),
-            Self::Grid(at) => write!(f, "column {}, row {}", at.x, at.y),
-            Self::Map(at) => write!(f, "{}, {}", at.x, at.y),
-            Self::Space(at) => write!(f, "({}, {}, {})", at.x, at.y, at.z),
-            Self::Line(line) => write!(f, "line {line}"),
-            Self::Byte(byte) => write!(f, "byte {byte}"),
-        }
-    }
-}
-
-impl fmt::Display for Obstacle {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Void => "voids",
-            Self::Barrier => "barriers",
-            Self::Slope => "too steep ground",
-            Self::NoValue => "places without a cost or tensor",
-        })
     }
 }
 
 fn clause(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!("; {text}") }
-}
-
-fn at_clause(at: &Option<Location>) -> String {
-    at.map(|at| format!(" at {at}")).unwrap_or_default()
 }
 
 fn between_clause(between: &[Obstacle]) -> String {
@@ -477,6 +241,8 @@ fn cause(source: &io::Error) -> String {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
 
     #[test]
