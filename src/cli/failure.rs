@@ -27,8 +27,12 @@ impl Failure {
         Self { message: message.into(), code: WRONG_USE }
     }
 
-    /// An error on the way to the goals of a scenario, which are named as the user wrote them.
-    pub(crate) fn on_the_way(error: Error, scenario: &Scenario) -> Self {
+    /// Words an error on the way to the goals of a scenario, which are named as the user wrote them.
+    pub(crate) fn between(scenario: &Scenario) -> impl Fn(Error) -> Self {
+        |error| Self::on_the_way(error, scenario)
+    }
+
+    fn on_the_way(error: Error, scenario: &Scenario) -> Self {
         let Error::NoPath { goal: Location::Grid(at), nearest, .. } = error else {
             return error.into();
         };

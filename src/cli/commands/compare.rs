@@ -36,9 +36,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
         .into_iter()
         .map(|metric| scenario::bind(&scenario, metric, &args.ground, run, control))
         .collect::<Result<Vec<_>>>()?;
-    let comparison = scenario
-        .compare(&fields, control)
-        .map_err(|error| Failure::on_the_way(error, &scenario))?;
+    let comparison = scenario.compare(&fields, control).map_err(Failure::between(&scenario))?;
     let table = table(&fields, &comparison).to_string();
     let provenance = scenario.provenance(&fields, Some(command_line()));
     let report = ComparisonReport::new(&fields, &comparison, provenance);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::DVec2;
-use ridgeway::eikonal::TensorField;
+use image::RgbaImage;
 use ridgeway::plan::{MatchReport, MatchedSurface, Scenario};
 use ridgeway::region::{
     Level, Match, Neighbours, Signature, matches, matches_within, outlines, signatures,
@@ -15,7 +15,7 @@ use ridgeway::surface::{NurbsGrid, NurbsSurface};
 use ridgeway::{Control, Modifiers, Surface, Terrain};
 
 use super::render::title;
-use super::segment::cut;
+use super::segment::{Sampled, cut};
 use crate::args::{CURVATURE, MatchArgs, RunArgs, known};
 use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
@@ -79,31 +79,13 @@ impl<'a> Subject<'a> {
     /// A file that cannot be read or used; a flag that a NURBS surface cannot have.
     fn open(path: &'a Path, args: &'a MatchArgs, run: &RunArgs, control: &Control) -> Result<Self> {
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let (ground, ranks, field) = if is_json {
-            if let Some(flag) = args.ground.metric.of_dems() {
-                let name = path.display();
-                return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
-            }
-            let (cols, rows) = args.nodes;
-            let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
-            let named = args.metric.unwrap_or(known(CURVATURE));
-            let metric = args.ground.metric.metric(named, None)?;
-            let metric = metric.on(&surface, &Modifiers::default(), control)?;
-            let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
-            drop(metric);
-            (Ground::Nurbs(Box::new(surface)), ranks, field)
-        } else {
-            let name = args.ground.metric.chosen(args.metric)?;
-            let places = (&[][..], &[][..]);
-            let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
-            let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
-            let (ranks, field) = (metric.seed_ranks(), TensorField::sample(&metric, control)?);
-            drop(metric);
-            (Ground::Heights(Box::new(scenario), Box::new(terrain)), ranks, field)
+        let (ground, sampled) = match is_json {
+            true => open_nurbs(path, args, control)?,
+            false => open_dem(path, args, run, control)?,
         };
         let surface = ground.surface();
-        let (regions, solver) = (&args.regions, args.ground.metric.solver());
-        let mut levels = cut(surface, field, ranks, regions, solver, control)?.levels;
+        let solver = args.ground.metric.solver();
+        let mut levels = cut(surface, sampled, &args.regions, solver, control)?.levels;
         let level = levels.pop().unwrap_or_default();
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
         Ok(Self { path, ground, level, signatures })
@@ -112,6 +94,33 @@ impl<'a> Subject<'a> {
     fn record(&self) -> MatchedSurface {
         let signatures = self.signatures.iter().enumerate();
         MatchedSurface::new(self.path, signatures.map(|(i, &signature)| (self.seed(i), signature)))
+    }
+
+    /// The regions in their colours.
+    fn picture(&self, colours: &[Rgb]) -> ridgeway::Result<RgbaImage> {
+        match &self.ground {
+            Ground::Heights(_, terrain) => {
+                let outlines = outlines(&self.level, terrain.frame().cols());
+                let mut map = MapPicture::new(terrain.frame(), terrain.heights());
+                (map.title, map.max_side_px) = (title(self.path), PIXELS);
+                map.regions = Some(RegionLayer {
+                    labels: &self.level.labels,
+                    colours: colours.to_vec(),
+                    borders: vec![&outlines],
+                    seeds: Vec::new(),
+                });
+                map.render()
+            }
+            Ground::Nurbs(surface) => {
+                let labels = self.level.labels.iter();
+                let colours: Vec<_> =
+                    labels.map(|l| l.map_or(Rgb::WHITE, |l| colours[l as usize])).collect();
+                let mut picture = SurfacePicture::new(&**surface, &colours);
+                (picture.title, picture.max_side_px) = (title(self.path), PIXELS);
+                (picture.blend, picture.regions) = (false, &self.level.labels);
+                picture.render()
+            }
+        }
     }
 
     /// The seed of a region: map coordinates on a DEM, else the point in space.
@@ -123,6 +132,33 @@ impl<'a> Subject<'a> {
             Ground::Nurbs(surface) => surface.space_jet(node).point.to_array().into(),
         }
     }
+}
+
+fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Ground, Sampled)> {
+    if let Some(flag) = args.ground.metric.of_dems() {
+        let name = path.display();
+        return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
+    }
+    let (cols, rows) = args.nodes;
+    let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
+    let metric = args.ground.metric.metric(args.metric.unwrap_or(known(CURVATURE)), None)?;
+    let sampled = Sampled::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
+    Ok((Ground::Nurbs(Box::new(surface)), sampled))
+}
+
+fn open_dem(
+    path: &Path,
+    args: &MatchArgs,
+    run: &RunArgs,
+    control: &Control,
+) -> Result<(Ground, Sampled)> {
+    let name = args.ground.metric.chosen(args.metric)?;
+    let places = (&[][..], &[][..]);
+    let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
+    let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
+    let sampled = Sampled::of(&metric, control)?;
+    drop(metric);
+    Ok((Ground::Heights(Box::new(scenario), Box::new(terrain)), sampled))
 }
 
 impl Ground {
@@ -152,32 +188,8 @@ fn colours(subjects: &[Subject<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
 
 /// The surfaces side by side.
 fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
-    let picture = |(subject, colours): (&Subject<'_>, &Vec<Rgb>)| match &subject.ground {
-        Ground::Heights(_, terrain) => {
-            let outlines = outlines(&subject.level, terrain.frame().cols());
-            let mut map = MapPicture::new(terrain.frame(), terrain.heights());
-            (map.title, map.max_side_px) = (title(subject.path), PIXELS);
-            map.regions = Some(RegionLayer {
-                labels: &subject.level.labels,
-                colours: colours.clone(),
-                borders: vec![&outlines],
-                seeds: Vec::new(),
-            });
-            map.render()
-        }
-        Ground::Nurbs(surface) => {
-            let labels = subject.level.labels.iter();
-            let colours: Vec<_> =
-                labels.map(|l| l.map_or(Rgb::WHITE, |l| colours[l as usize])).collect();
-            let mut picture = SurfacePicture::new(&**surface, &colours);
-            (picture.title, picture.max_side_px) = (title(subject.path), PIXELS);
-            (picture.blend, picture.regions) = (false, &subject.level.labels);
-            picture.render()
-        }
-    };
-    encode_png(&beside(
-        &subjects.iter().zip(colours).map(picture).collect::<ridgeway::Result<Vec<_>>>()?,
-    )?)
+    let pictures = subjects.iter().zip(colours).map(|(subject, colours)| subject.picture(colours));
+    encode_png(&beside(&pictures.collect::<ridgeway::Result<Vec<_>>>()?)?)
 }
 
 /// The two largest eigenvalues of all regions.

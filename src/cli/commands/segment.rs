@@ -34,10 +34,9 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let relief = formats.iter().any(|format| format == "png").then_some(terrain);
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
-    let field = TensorField::sample(&metric, control)?;
-    let ranks = metric.seed_ranks();
+    let sampled = Sampled::of(&metric, control)?;
     let (regions, solver) = (&args.regions, args.ground.metric.solver());
-    let segmentation = cut(&scenario.surface, field, ranks, regions, solver, control)?;
+    let segmentation = cut(&scenario.surface, sampled, regions, solver, control)?;
     let measures = measures(&segmentation, &scenario.surface, control)?;
     let outcome = Regions { scenario: &scenario, metric: &metric, segmentation, measures };
     control.check()?;
@@ -63,14 +62,25 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     Report::new(outcome.text() + &written, report).print(run)
 }
 
-/// Cuts a surface, on which `field` is the metric, by seeds in the order of their `ranks`, as the flags ask.
+/// A metric at the nodes of a surface, and the order in which these are tried as seeds.
+pub(super) struct Sampled {
+    ranks: Vec<f64>,
+    field: TensorField,
+}
+
+impl Sampled {
+    pub(super) fn of(metric: &MetricField<'_>, control: &Control) -> ridgeway::Result<Self> {
+        Ok(Self { ranks: metric.seed_ranks(), field: TensorField::sample(metric, control)? })
+    }
+}
+
+/// Cuts a surface as the flags ask.
 ///
 /// # Errors
 /// Radii that do not fall; too many or no regions; cancelled.
 pub(super) fn cut(
     surface: &dyn Surface,
-    field: TensorField,
-    ranks: Vec<f64>,
+    Sampled { ranks, field }: Sampled,
     regions: &RegionArgs,
     solver: Solver,
     control: &Control,
