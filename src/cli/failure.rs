@@ -27,12 +27,12 @@ impl Failure {
         Self { message: message.into(), code: WRONG_USE }
     }
 
-    /// Words an error on the way to the goals of a scenario, which are named as the user wrote them.
+    /// Words an error on the path to the goals of a scenario, which are named as the user wrote them.
     pub(crate) fn between(scenario: &Scenario) -> impl Fn(Error) -> Self {
-        |error| Self::on_the_way(error, scenario)
+        |error| Self::on_the_path(error, scenario)
     }
 
-    fn on_the_way(error: Error, scenario: &Scenario) -> Self {
+    fn on_the_path(error: Error, scenario: &Scenario) -> Self {
         let Error::NoPath { goal: Location::Grid(at), nearest, .. } = error else {
             return error.into();
         };
@@ -59,7 +59,7 @@ impl From<Error> for Failure {
         let (code, advice) = match &error {
             Error::NoPath { .. } => (NO_PATH, ""),
             Error::Cancelled => (CANCELLED, "; nothing was written"),
-            // A file in the way is a wrong use, not a fault of the disk.
+            // A file that exists is a wrong use, not a fault of the disk.
             Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
                 (WRONG_USE, "; give --overwrite to replace it")
             }

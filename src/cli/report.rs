@@ -1,4 +1,4 @@
-//! What a command tells: text for people, JSON for machines, and the exit code.
+//! What a command reports: text for people, JSON for machines.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -50,7 +50,7 @@ pub(crate) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Tells on standard error what the reader of the DEM noticed.
+/// Prints on standard error what the reader of the DEM noticed.
 pub(crate) fn notes(terrain: &Terrain, run: &RunArgs) {
     if !run.quiet {
         terrain.notes().iter().for_each(|note| eprintln!("note: {note}"));

@@ -39,7 +39,7 @@ pub(crate) fn prepare(
     Ok((Scenario::on(&terrain, question, control)?, terrain))
 }
 
-/// Reads the DEM and tells what its reader noticed.
+/// Reads the DEM and prints what its reader noticed.
 pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
     let terrain = Terrain::open(dem)?;
     report::notes(&terrain, run);

@@ -152,10 +152,10 @@ impl StartRegion {
         let far = DVec2::INFINITY;
         let (least, most) =
             self.shapes.vertices().fold((far, -far), |(a, b), p| (a.min(p), b.max(p)));
-        let turns = field.tiling.images(at, least - radius, most + radius);
-        let feet = turns.filter_map(|turn| {
-            let (foot, length) = self.own_foot(field, at + turn, radius)?;
-            Some((foot - turn, length))
+        let images = field.tiling.images(at, least - radius, most + radius);
+        let feet = images.filter_map(|shift| {
+            let (foot, length) = self.own_foot(field, at + shift, radius)?;
+            Some((foot - shift, length))
         });
         feet.min_by(|a, b| a.1.total_cmp(&b.1))
     }

@@ -210,7 +210,7 @@ impl GridFrame {
 
     /// Whether grid coordinates lie on a cell of the raster: the hull of the nodes and half a cell more.
     #[must_use]
-    pub fn covers(&self, at: DVec2) -> bool {
+    pub fn is_on_cell(&self, at: DVec2) -> bool {
         let last = DVec2::new(self.cols as f64 - 0.5, self.rows as f64 - 0.5);
         at.cmpge(DVec2::splat(-0.5)).all() && at.cmple(last).all()
     }

@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-/// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones; `is_open` tells
-/// the nodes by column and row, also those outside.
+/// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones; `is_open` is asked
+/// for nodes by column and row, also outside the grid.
 pub(crate) fn in_sight(a: DVec2, b: DVec2, is_open: impl Fn(isize, isize) -> bool) -> bool {
     /// Samples per cell of length: a wall in a cell is crossed by more than one of them or hardly touched.
     const DENSITY: f64 = 8.0;

@@ -62,19 +62,17 @@ impl Scenario {
         let barrier = read_barriers(&question, georeference)?;
         let (start_shapes, starts) = locate(Role::Start, &question.starts, terrain)?;
         let (goal_shapes, goals) = locate(Role::Goal, &question.goals, terrain)?;
-        question
-            .goals
-            .iter()
-            .zip(&goal_shapes)
-            .try_for_each(|(goal, shapes)| check_points(goal, shapes))?;
+        for (goal, shapes) in question.goals.iter().zip(&goal_shapes) {
+            check_points(goal, shapes)?;
+        }
         let ground = OpenGround { terrain, barrier: barrier.as_deref() };
         starts.iter().chain(&goals).try_for_each(|site| ground.check(site))?;
         for (start, shapes) in question.starts.iter().zip(&start_shapes) {
             ground.check_touched(start, shapes)?;
         }
-        let read = question.tensors.as_deref().map(|path| read_tensors(path, frame));
-        let tensors = read.transpose()?;
-        let cost = question.cost.as_deref().map(|path| read_costs(path, frame)).transpose()?;
+        let (tensors, cost) = (question.tensors.as_deref(), question.cost.as_deref());
+        let tensors = tensors.map(|path| read_tensors(path, frame)).transpose()?;
+        let cost = cost.map(|path| read_costs(path, frame)).transpose()?;
         let surface = HeightSurface::fit(terrain, &question.fit, control)
             .map_err(|error| error.in_file(&question.dem))?;
         Ok(Self {

@@ -36,7 +36,7 @@ impl Site {
     ) -> Result<Self> {
         let frame = terrain.frame();
         let grid = notation.to_grid(at, terrain.georeference())?;
-        if frame.covers(grid) {
+        if frame.is_on_cell(grid) {
             // The surface ends at the outermost nodes, half a cell before the raster does.
             return Ok(Self { role, name, at: frame.clamp(grid), notation });
         }
@@ -82,7 +82,8 @@ fn outside(
         _ => (DVec2::new(0.0, last.y), DVec2::new(last.x, 0.0)),
     };
     let swapped = DVec2::new(at.y, at.x);
-    let is_swapped = notation.to_grid(swapped, georeference).is_ok_and(|grid| frame.covers(grid));
+    let is_swapped =
+        notation.to_grid(swapped, georeference).is_ok_and(|grid| frame.is_on_cell(grid));
     let kind = PlaceErrorKind::Outside {
         from: notation.write(low, georeference)?,
         to: notation.write(high, georeference)?,
