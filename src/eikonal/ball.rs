@@ -2,7 +2,7 @@
 //!
 //! A segmentation needs thousands of small ones. So the memory of a solve is made once, for the whole grid, and only what a ball
 //! reaches is touched: a tile is *opened*, that is given the values it has before a front comes, when it or a tile beside it is first
-//! solved, and put back before the next ball. The equation is that of a solve of the whole field with the same stop, the cone around the
+//! solved, and put back before the next ball. The equation is that of a solve of the whole field with the same stop, the factor around the
 //! node included.
 
 use std::iter::once;
