@@ -138,8 +138,8 @@ impl Best {
 }
 
 /// `−mᵀMw/‖m‖` in the middle `m` of a segment, with `D = [s β; β q]` as in
-/// [`ClosedForm`](super::stencil::segment::ClosedForm). Where `d` is below this the slope of the sum is negative there, and the point of the least nearer to
-/// `b`.
+/// [`ClosedForm`](super::stencil::segment::ClosedForm). Where `d` is below this the slope of the sum is negative in the middle, and
+/// the point of the least is nearer to `b`.
 #[inline(always)]
 fn slope_in_the_middle(s: f32, q: f32, beta: f32, det: f32) -> f32 {
     (beta - 0.5 * s) / ((q - beta + 0.25 * s) * det).sqrt()

@@ -61,8 +61,8 @@ impl Default for Surroundings {
 }
 
 impl Surroundings {
-    /// Finds the feet of tiles side by side, `first` and those after it, given those of the round before, and the neighbours of each that it reads, one bit
-    /// each as in [`RING`].
+    /// Finds the feet of tiles side by side, `first` and those after it, given those of the round before; and the neighbours
+    /// that each reads, one bit each as in [`RING`].
     pub(super) fn find(
         &mut self,
         input: &Input<'_>,

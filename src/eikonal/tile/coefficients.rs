@@ -40,8 +40,8 @@ struct Along {
 }
 
 impl Along {
-    /// Sets what node `i` needs, from `s`, `1/s` and `1/q`, from `β` and `det D`, the length of `a`, and lengths of the diagonals with their inverses over `det D`. By
-    /// how much the least over a segment may lie below an end: see [`Limits::margin`].
+    /// Sets what node `i` needs, with `‖a‖`, and with `‖b‖` and `1/(det D ‖b‖)` of the rising diagonal and of the falling one. Comes
+    /// to how far the least over a segment may lie below an end, see [`Limits::margin`].
     #[inline(always)]
     fn set(
         &mut self,
