@@ -12,7 +12,7 @@ use crate::route::Route;
 /// The route from `start` to `goal` over a DEM on the curvature metric, with the defaults of everything.
 ///
 /// # Errors
-/// Those of [`Question::prepare`], [`Scenario::bind`](super::Scenario::bind)(super::Scenario::bind) and [`Scenario::routes`](super::Scenario::routes)(super::Scenario::routes); a goal that is not one point.
+/// Those of [`Question::prepare`], [`Scenario::bind`](super::Scenario::bind) and [`Scenario::routes`](super::Scenario::routes); a goal that is not one point.
 pub fn route(dem: impl AsRef<Path>, start: Place, goal: Place) -> Result<Route> {
     let control = Control::default();
     let scenario = Question::new(dem.as_ref()).from(start).to(goal).prepare(&control)?;
