@@ -509,6 +509,22 @@ fn places_off_the_ground_are_explained() {
         2,
         "--goal 500780,5000600 lies on a barrier; the nearest good place is 500750,5000600",
     );
+    let steep = "route range.tif --start pixel:3,3 --goal pixel:50,30";
+    folder.bad(
+        &format!("{steep} --max-slope 3"),
+        2,
+        "--start pixel:3,3 lies on ground steeper than --max-slope allows; the nearest good place is pixel:5,5",
+    );
+    let costs = format!("{}{}", "-1 ".repeat(10), "2 ".repeat(51)).repeat(41);
+    folder.write(
+        "cost.asc",
+        &format!("ncols 61\nnrows 41\nxllcorner 499985\nyllcorner 4999985\ncellsize 30\nNODATA_value -1\n{costs}\n"),
+    );
+    folder.bad(
+        &format!("{steep} --cost cost.asc"),
+        2,
+        "--start pixel:3,3 lies where --cost or --tensor has no value; the nearest good place is pixel:10,3",
+    );
     folder.bad(
         "route plain.tif --start lonlat:1,2 --goal pixel:4,1",
         2,
