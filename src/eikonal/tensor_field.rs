@@ -426,7 +426,7 @@ mod tests {
             [Sym2::new(1e9, 0.0, 1e9), Sym2::new(1e-9, 0.0, 1e-9), Sym2::new(1e16, 0.0, 1e-16)]
         {
             let error = odd(Some(wild)).unwrap_err().to_string();
-            assert!(error.contains("column 20, row 17 has"), "{error}");
+            assert!(error.contains("column 20, row 17 is one with entries"), "{error}");
             assert!(odd(None).unwrap().set(20, 17, Some(wild)).is_err());
         }
         let [nan, infinite] = [f64::NAN, f64::INFINITY].map(|x| Sym2::new(x, 0.0, 1.0));
