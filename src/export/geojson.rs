@@ -282,7 +282,7 @@ pub(super) mod tests {
             Err(Error::argument("the CRS", "unknown", "known"))
         });
         let note = json["coordinate_note"].as_str().unwrap();
-        assert!(note.contains("map coordinates") && note.contains("names no CRS"), "{note}");
+        assert!(note.contains("map coordinates") && note.contains("the CRS is unknown"), "{note}");
     }
 
     #[test]

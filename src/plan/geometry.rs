@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use geo_types::Geometry;
-use geojson::GeoJson;
+use geojson::{GeoJson, GeometryValue, Position};
 
 use crate::error::{Error, Result};
 use crate::grid::Shapes;
@@ -43,9 +43,36 @@ fn lonlat_shapes(text: &str) -> std::result::Result<Shapes, geojson::Error> {
     };
     let mut shapes = Shapes::default();
     for geometry in geometries {
+        check_positions(&geometry.value)?;
         shapes.add(Geometry::try_from(geometry)?);
     }
     Ok(shapes)
+}
+
+/// Every position must have two numbers at least: the conversion to geometry takes it for granted.
+fn check_positions(geometry: &GeometryValue) -> std::result::Result<(), geojson::Error> {
+    match geometry {
+        GeometryValue::Point { coordinates } => check_position(coordinates),
+        GeometryValue::MultiPoint { coordinates } | GeometryValue::LineString { coordinates } => {
+            coordinates.iter().try_for_each(check_position)
+        }
+        GeometryValue::MultiLineString { coordinates } | GeometryValue::Polygon { coordinates } => {
+            coordinates.iter().flatten().try_for_each(check_position)
+        }
+        GeometryValue::MultiPolygon { coordinates } => {
+            coordinates.iter().flatten().flatten().try_for_each(check_position)
+        }
+        GeometryValue::GeometryCollection { geometries } => {
+            geometries.iter().try_for_each(|geometry| check_positions(&geometry.value))
+        }
+    }
+}
+
+fn check_position(position: &Position) -> std::result::Result<(), geojson::Error> {
+    match position.as_slice().len() {
+        0 | 1 => Err(geojson::Error::PositionTooShort(position.as_slice().len())),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
