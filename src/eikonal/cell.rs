@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::DistanceMap;
-use super::source::sees;
+use super::source::has_line_of_sight;
 use super::stencil::segment::segment;
 
 impl DistanceMap {
@@ -23,7 +23,7 @@ impl DistanceMap {
                     && best.is_none_or(|(least, ..)| sum < least)
                     && let Some(g) = self.stored_at(to)
                     && g < value
-                    && sees(&self.field, at, to)
+                    && has_line_of_sight(&self.field, at, to)
                 {
                     best = Some((sum, to, g));
                 }
@@ -46,7 +46,7 @@ impl DistanceMap {
         self.borders(at)
             .flat_map(|(a, b)| [a, b])
             .filter_map(|(c, r)| Some((point((c, r)), self.reached(c, r)?)))
-            .filter(|&(p, _)| p != at && sees(&self.field, at, p))
+            .filter(|&(p, _)| p != at && has_line_of_sight(&self.field, at, p))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 

@@ -128,7 +128,7 @@ impl DistanceMap {
         let value = self.reached(col, row)?;
         let (col, row) = self.field.tiling.node(col, row)?;
         let node = DVec2::new(col as f64, row as f64);
-        if let Some(foot) = self.straight_home(node, value) {
+        if let Some(foot) = self.straight_foot(node, value) {
             return Some(foot - node);
         }
         self.best_foot(col, row).map(|(_, foot)| foot)

@@ -1,4 +1,4 @@
-//! Which factors are taken out of the equation, and where.
+//! Source factors: which ones there are, and where each applies.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
@@ -7,20 +7,20 @@ use rayon::prelude::*;
 
 use super::source::POINT_RADIUS;
 use super::start::StartRegion;
-use super::stencil::factoring::{ALIKE, Factor, are_roots_within};
+use super::stencil::factoring::{Factor, UNIFORM_RATIO, are_roots_within};
 use super::tensor_field::{TensorField, TensorTile};
 use crate::grid::tiling::{SIDE, Tiling};
 use crate::linalg::Sym2;
 use crate::linalg::lanes::{choose, greatest, lanes, least};
 use crate::linalg::simd::{self, Kernel};
 
-/// Radius of the region around a point where its factor is taken out, as a share of the grid's longer side: fixed in
+/// Radius of the region around a point where its factor applies, as a share of the grid's longer side: fixed in
 /// metres, not in cells, or first order would keep its logarithm. In a prototype at n = 1001 .05, .1, .2, .4 gave a ratio of 400
-/// a mean error of 5.2, 2.3, .7, .3 e-4 (after one correction) and are alike on curvature tensors, which vary.
+/// a mean error of 5.2, 2.3, .7, .3 e-4 (after one correction) and the same on curvature tensors, which vary.
 const RADIUS: f64 = 0.2;
 
-/// With more corners none are taken out: each is looked at for each tile, and the fans of the many corners of a fine outline
-/// are narrow.
+/// With more corners there are no factors: for each tile all of them would be compared, and the fans of the many corners of a fine
+/// outline are narrow.
 const MOST_FACTORS: usize = 1000;
 
 /// The factors of the start regions, and which of them each tile has.
@@ -28,8 +28,8 @@ const MOST_FACTORS: usize = 1000;
 pub(crate) struct Factors {
     tiling: Tiling,
     factors: Vec<Factor>,
-    /// Index of the tile's factor plus one; 0 if it has none. Empty if the factors are those of one point: which is the tile's is
-    /// then quickly found.
+    /// Index of each tile's factor plus one, 0 if it has none. Empty if all factors are images of one point: that of a tile is then
+    /// quickly found.
     of_tile: Vec<u32>,
 }
 
@@ -38,14 +38,14 @@ impl Factors {
         Self::within(field, starts, f64::INFINITY)
     }
 
-    /// Factors that are the same up to a `distance` (stored units); only ground that can be reached so far is looked at.
+    /// Factors that agree with those of [`new`](Self::new) up to a `distance` (stored units); only nodes that can be reached within it are looked at.
     pub(crate) fn within(field: &TensorField, starts: &[StartRegion], distance: f64) -> Self {
         let of_start = |start: &StartRegion| {
             let travelled = start.value * field.root_scale();
             let corners = start.shapes.corners();
             corners
-                .filter_map(|(at, sides)| {
-                    Some(Factor::new(at, field.metric_at(at)?, sides, travelled))
+                .filter_map(|(at, edges)| {
+                    Some(Factor::new(at, field.metric_at(at)?, edges, travelled))
                 })
                 .collect::<Vec<_>>()
         };
@@ -57,14 +57,15 @@ impl Factors {
         if factors.is_empty() || factors.len() > MOST_FACTORS || radius < POINT_RADIUS {
             return Self::default();
         }
-        // No more nodes are looked at than there are, however many factors.
+        // The discs that are searched together hold no more nodes than the grid, however many factors there are.
         let share = (tiling.cols * tiling.rows) as f64 / factors.len() as f64;
         for (number, factor) in factors.iter_mut().enumerate() {
             factor.number = number;
             factor.radius = radius;
             let most = radius.min(0.5 * share.sqrt()).min(factor.extent(distance));
-            let alike = factor.images(&tiling).map(|image| image.reach_of_alike(field, most));
-            factor.alike = alike.fold(most, f64::min);
+            let uniform_radius =
+                factor.images(&tiling).map(|image| image.find_uniform_radius(field, most));
+            factor.uniform_radius = uniform_radius.fold(most, f64::min);
         }
         let tiles = if factors.len() > 1 { tiling.tiles() } else { 0 };
         let factors: Vec<Factor> =
@@ -88,7 +89,7 @@ impl Factors {
         self.factors.get(index.checked_sub(1)? as usize)
     }
 
-    /// The factor that is taken out at all the given nodes, seen from there.
+    /// The factor that applies at all the given nodes: its image nearest to them where the grid is periodic.
     pub(crate) fn around(
         &self,
         field: &TensorField,
@@ -98,8 +99,8 @@ impl Factors {
         for (col, row) in nodes {
             let (c, r) = field.tiling.node(col, row)?;
             let (&factor, ..) = self.at_node(field, c, r)?;
-            let turn = DVec2::new((col - c as isize) as f64, (row - r as isize) as f64);
-            let factor = Factor { at: factor.at + turn, ..factor };
+            let shift = DVec2::new((col - c as isize) as f64, (row - r as isize) as f64);
+            let factor = Factor { at: factor.at + shift, ..factor };
             if found.is_some_and(|found| !found.is(&factor)) {
                 return None;
             }
@@ -113,7 +114,7 @@ impl Factors {
         self.at_node(field, col, row).map_or([0.0; 8], |(_, _, terms)| terms)
     }
 
-    /// The factor that is taken out at a node, the vector to the node from its point, and the terms.
+    /// The factor that applies at a node, the vector to the node from its point, and the terms.
     pub(crate) fn at_node(
         &self,
         field: &TensorField,
@@ -127,9 +128,9 @@ impl Factors {
     }
 }
 
-/// The factor that brings the least distance to all of a tile under its own metric, if it reaches into the tile, as for
-/// [`Factors::of_tile`]. Where another that is not its image brings less somewhere, none may be taken out: its front would meet
-/// the terms of a foreign factor, each of which lowers it a little.
+/// The factor whose distance, under its own metric, is the least on all of a tile, if its disc touches the tile; its index plus one, as in
+/// [`Factors::of_tile`]. 0 where another that is not its image is less somewhere: the front of that one would meet the terms of a foreign
+/// factor, each of which lowers it a little.
 fn nearest(factors: &[Factor], tiling: &Tiling, tile: usize) -> u32 {
     let [cols, rows] = tiling.size(tile);
     let half = 0.5 * (DVec2::new(cols as f64, rows as f64) - 1.0);
@@ -139,7 +140,7 @@ fn nearest(factors: &[Factor], tiling: &Tiling, tile: usize) -> u32 {
     if factors[index].gap(tiling, tile).length() > radius {
         return 0;
     }
-    // The places of one factor are convex where all are alike: the corners are enough.
+    // The region of one factor is convex where all have the same metric: comparing at the corners is enough.
     let is_same = |x: f64, y: f64| {
         let corner = middle + DVec2::new(x, y) * (half + 1.0);
         factors[nearest_to(factors, corner)].number == number
@@ -149,17 +150,17 @@ fn nearest(factors: &[Factor], tiling: &Tiling, tile: usize) -> u32 {
     if is_alone { index as u32 + 1 } else { 0 }
 }
 
-/// The factor that brings the least distance to a point, under its own metric.
+/// The factor whose distance to a point, under its own metric, is the least.
 fn nearest_to(factors: &[Factor], at: DVec2) -> usize {
     let length = |factor: &Factor| factor.travelled + factor.value(at - factor.at);
     let lengths = factors.iter().map(length).enumerate();
     lengths.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
 }
 
-/// Where a factor reaches.
+/// Where a factor applies.
 impl Factor {
-    /// How far all ground is like that of the point, in rows and columns, up to `most` cells.
-    fn reach_of_alike(&self, field: &TensorField, most: f64) -> f64 {
+    /// How many rows and columns around the point, up to `most`, have a metric nearly that of the point, see [`UNIFORM_RATIO`].
+    fn find_uniform_radius(&self, field: &TensorField, most: f64) -> f64 {
         let tiling = field.tiling;
         let gap = |tile: usize| self.gap(&tiling, tile).max_element();
         let mut tiles: Vec<usize> =
@@ -171,12 +172,12 @@ impl Factor {
                 break;
             }
             let from = tiling.first(tile) - self.at.round();
-            let unlike = simd::dispatch(NearestUnlike {
+            let dissimilar = simd::dispatch(NearestDissimilar {
                 tile: field.tensors(tile),
                 metric: self.metric,
                 from,
             });
-            nearest = least(nearest, unlike);
+            nearest = least(nearest, dissimilar);
         }
         f64::from(nearest - 1.0).max(0.0)
     }
@@ -187,32 +188,32 @@ impl Factor {
         ((self.at - tiling.first(tile) - half).abs() - half).max(DVec2::ZERO)
     }
 
-    /// How far in cells from the point a path of `length`, in stored units, can lead while all ground is like that of the point, a node on
-    /// either side included.
+    /// How far in cells from the point a path of `length` (stored units) can lead within the uniform radius, and a node more at
+    /// either end.
     fn extent(&self, length: f64) -> f64 {
         let d = self.metric.inverse();
         let fastest = 0.5 * (d.xx + d.yy) + (0.5 * (d.xx - d.yy)).hypot(d.xy);
-        length * (f64::from(ALIKE) * fastest).sqrt() + 2.0
+        length * (f64::from(UNIFORM_RATIO) * fastest).sqrt() + 2.0
     }
 
-    /// Its images around a periodic grid whose discs touch the nodes; of more than three in a direction, the middle ones.
+    /// Its periodic images whose discs touch the grid; of more than three in a direction, the middle ones.
     fn images(self, tiling: &Tiling) -> impl Iterator<Item = Self> {
         let period = DVec2::new(tiling.cols as f64, tiling.rows as f64);
         let reach = period.min(DVec2::splat(self.radius));
-        let turns = tiling.images(self.at, -reach, period - 1.0 + reach);
-        turns.map(move |turn| Self { at: self.at + turn, ..self })
+        let shifts = tiling.images(self.at, -reach, period - 1.0 + reach);
+        shifts.map(move |shift| Self { at: self.at + shift, ..self })
     }
 }
 
-/// How far the nearest open node of a tile is from the point, in rows or columns, whose ground is not like `metric`; the first
-/// node lies at `from`.
-struct NearestUnlike<'a> {
+/// Distance from the point, in rows or columns, of the nearest open node of a tile whose metric is not nearly `metric`; the first
+/// node of the tile lies at `from`.
+struct NearestDissimilar<'a> {
     tile: &'a TensorTile,
     metric: Sym2,
     from: DVec2,
 }
 
-impl Kernel for NearestUnlike<'_> {
+impl Kernel for NearestDissimilar<'_> {
     type Output = f32;
 
     #[inline(always)]
@@ -228,9 +229,10 @@ impl Kernel for NearestUnlike<'_> {
             for i in 0..SIDE {
                 let yy = (det[i] + xy[i] * xy[i]) / xx[i];
                 let trace = mxx * xx[i] + 2.0 * mxy * xy[i] + myy * yy;
-                let like = (det[i] == 0.0) | are_roots_within(trace, det[i] * mdet, ALIKE);
+                let similar =
+                    (det[i] == 0.0) | are_roots_within(trace, det[i] * mdet, UNIFORM_RATIO);
                 let distance = greatest((from.x as f32 + i as f32).abs(), y);
-                nearest[i] = least(nearest[i], choose(like, f32::INFINITY, distance));
+                nearest[i] = least(nearest[i], choose(similar, f32::INFINITY, distance));
             }
         }
         let mut least_of_all = f32::INFINITY;

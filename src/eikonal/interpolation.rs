@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::distance_map::DistanceMap;
-use super::source::{self, sees};
+use super::source::{self, has_line_of_sight};
 use super::stencil::factoring::Factor;
 use crate::linalg::bilinear::{CORNERS, corner_weights};
 
@@ -15,8 +15,8 @@ pub(super) const ROUNDED_UP: f64 = 1.0 + 1e-6;
 impl DistanceMap {
     /// Distance at grid coordinates; `None` outside the grid and where not reached.
     ///
-    /// Near the start the length of the straight path; elsewhere cubic between the nodes where all around are
-    /// reached, bilinear in a cell with four reached corners, and the solver's own update beside walls.
+    /// Near the start the length of the straight path; elsewhere cubic interpolation where all 16 nodes around are reached,
+    /// bilinear in a cell with four reached corners, and next to walls the best straight step to a corner in sight.
     #[must_use]
     pub fn at(&self, at: DVec2) -> Option<f64> {
         if !self.field.tiling.contains(at) {
@@ -30,8 +30,8 @@ impl DistanceMap {
         Some(value / self.field.root_scale())
     }
 
-    /// The point of the start region to go to straight from `at`, if that is the shortest path.
-    pub(crate) fn straight_home(&self, at: DVec2, value: f64) -> Option<DVec2> {
+    /// The foot of `at` on the start regions, if the straight path to it is the shortest.
+    pub(crate) fn straight_foot(&self, at: DVec2, value: f64) -> Option<DVec2> {
         let (foot, length) = self.straight(at)?;
         (length <= ROUNDED_UP * value).then_some(foot)
     }
@@ -41,8 +41,8 @@ impl DistanceMap {
         source::foot_on_any(&self.starts, &self.field, at, SEED_SIGHT)
     }
 
-    /// Cubic convolution (Keys 1981) of what is left without the factor, where all sixteen nodes are reached; not
-    /// where it leaves what the corners of the cell span, at a kink.
+    /// Cubic convolution (Keys 1981) of `w = g − g0`, the value without the factor. `None` unless all sixteen nodes are reached, and
+    /// where it lies far outside the range of the corners of the cell, as at a kink.
     fn cubic(&self, at: DVec2) -> Option<f64> {
         let cell = at.floor();
         let nodes = || (0..16).map(|k| (k % 4, k / 4));
@@ -64,10 +64,10 @@ impl DistanceMap {
         is_near_span(value, [w[1][1], w[1][2], w[2][1], w[2][2]]).then(|| (value + g0(at)).max(0.0))
     }
 
-    /// The point of the start that the factor around `at` comes from, if nothing is in the way.
-    pub(crate) fn centre_in_sight(&self, at: DVec2) -> Option<DVec2> {
+    /// The point of the start to which the factor around `at` belongs, if it is in sight.
+    pub(crate) fn factor_point_in_sight(&self, at: DVec2) -> Option<DVec2> {
         let factor = self.factor_around(at)?;
-        sees(&self.field, at, factor.at).then_some(factor.at)
+        has_line_of_sight(&self.field, at, factor.at).then_some(factor.at)
     }
 
     /// What the factor around `at` adds to the value read at `to`, see [`super::stencil::factoring`].
@@ -89,7 +89,7 @@ impl DistanceMap {
         straight.chain(self.interpolated(at)).min_by(f64::total_cmp).map(|g| g.max(0.0))
     }
 
-    /// Bilinear where all corners of the cell are reached, else by way of the best corner in sight.
+    /// Bilinear where all corners of the cell are reached, else the value through the best corner in sight.
     fn interpolated(&self, at: DVec2) -> Option<f64> {
         let cell = at.floor();
         let weights = corner_weights(at - cell);
@@ -100,13 +100,13 @@ impl DistanceMap {
             let metric = self.field.metric_at(at)?;
             corners
                 .filter_map(|(node, _)| Some((point(node), self.reached(node.0, node.1)?)))
-                .filter(|&(node, _)| sees(&self.field, at, node))
+                .filter(|&(node, _)| has_line_of_sight(&self.field, at, node))
                 .map(|(node, value)| value + metric.norm(node - at))
                 .min_by(f64::total_cmp)
         })
     }
 
-    /// Between corners, each with its weight, what is smooth: the value without the factor. `None` if one is not reached.
+    /// Bilinear between corners, each with its weight, of `w = g − g0`, the value without the factor. `None` if one is not reached.
     fn bilinear(
         &self,
         at: DVec2,
@@ -115,11 +115,11 @@ impl DistanceMap {
         let values = corners.clone().map(|((c, r), weight)| self.reached(c, r).map(|g| weight * g));
         let linear: Option<f64> = values.sum();
         let factor = self.factors.around(&self.field, corners.clone().map(|(node, _)| node));
-        let bent = factor.map_or(0.0, |factor| {
+        let g0_less_linear = factor.map_or(0.0, |factor| {
             let g0 = |at: DVec2| factor.value(at - factor.at);
             g0(at) - corners.map(|(node, weight)| weight * g0(point(node))).sum::<f64>()
         });
-        Some((linear? + bent).max(0.0))
+        Some((linear? + g0_less_linear).max(0.0))
     }
 }
 

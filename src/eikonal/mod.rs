@@ -1,11 +1,11 @@
 //! Distances: `√(∇gᵀ D ∇g) = 1`, `g = 0` on the start region.
 //!
 //! [`Solver::solve`] discretises the equation by the semi-Lagrangian update on the eight triangles around a node
-//! (`stencil/`) and iterates it to a standstill tile by tile (`tile/`) in order of distance (`schedule/`). First order
-//! in the spacing, also near the start, where the cone of a point is taken out (`stencil/factoring.rs`); second order by deferred
+//! (`stencil/`) and iterates it until it converges, tile by tile (`tile/`), in order of distance (`schedule/`). First order
+//! in the spacing, also near the start, where source factoring removes the singularity (`stencil/factoring.rs`); second order by deferred
 //! correction if asked for ([`Accuracy`], `second_order/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
-//! ns of one core and 16 bytes per node, at high accuracy 80 to 150 ns and 24 bytes. [`mod@reference`] is the slow
-//! judge; `docs/solver.md` has the measurements.
+//! ns of one core and 16 bytes per node, at high accuracy 80 to 150 ns and 24 bytes. [`mod@reference`] is the
+//! slow solver that tests compare with; `docs/solver.md` has the measurements.
 
 mod allocation;
 mod ball;
@@ -30,7 +30,7 @@ pub use self::distance_map::DistanceMap;
 pub use self::schedule::rounds::Statistics;
 pub use self::schedule::stop::Stop;
 pub use self::solver::{Accuracy, Solver};
-pub(crate) use self::source::sees;
+pub(crate) use self::source::has_line_of_sight;
 pub use self::start::StartRegion;
 pub use self::tensor_field::TensorField;
 

@@ -1,4 +1,4 @@
-//! The slow and obviously right solver: judge of the tests.
+//! A slow and simple solver of the same equation, which tests compare with.
 
 use glam::DVec2;
 
@@ -54,7 +54,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
         }
     }
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
-    // Of no tile it is known what could not improve it.
+    // Nothing is known of the margins, so that nothing counts as final.
     let unknown = Limits { margin: f32::MAX, longest_step: f32::MAX };
     let limits = vec![unknown; field.tiling.tiles()];
     Ok(DistanceMap {

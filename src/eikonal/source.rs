@@ -1,4 +1,4 @@
-//! Start values: at the nodes on and near points, lines and areas, and the path back to these.
+//! Start values at the nodes on and near the start regions, and the last straight piece of a path back to these.
 
 use std::array::from_fn;
 
@@ -14,16 +14,16 @@ use crate::grid::tiling::{AREA, Tiling};
 use crate::grid::{in_sight, nodes_inside};
 use crate::linalg::Sym2;
 
-/// Values that a tile's nodes have from the start, infinite where none.
+/// Start values of the nodes of a tile, infinite where there is none.
 pub(super) type Seeds = [f32; AREA];
 
-/// Around a point or a corner, nodes this near get the length of the geodesic to it, of second order, see [`geodesic`]. A ball of a
+/// Around a point or a corner, nodes within so many cells get the length of the geodesic to it, see [`geodesic_length`]. A disc of a
 /// fixed size in cells is safe on any metric.
 pub(super) const POINT_RADIUS: f64 = 4.0;
 /// Around a line or the border of an area: enough that every triangle next to it has values.
 const LINE_RADIUS: f64 = 1.5;
 
-/// How far from the nearest point of a line the foot of a node on it is looked for, in cells.
+/// How far from the nearest point of a line, in cells, the foot of a node may lie on it.
 const REACH: f64 = 100.0;
 
 /// Start values of all regions in stored units: calls `set(col, row, value, region)` for nodes on and near them.
@@ -111,26 +111,26 @@ impl StartRegion {
     fn seed(&self, field: &TensorField, mut set: impl FnMut(usize, usize, f64)) {
         let travelled = self.value * field.root_scale();
         let mut set = |col, row, length| set(col, row, travelled + length);
-        for (at, sides) in self.shapes.corners() {
+        for (at, edges) in self.shapes.corners() {
             let Some(metric) = field.metric_at(at) else { continue };
-            let factor = Factor::new(at, metric, sides, travelled);
+            let factor = Factor::new(at, metric, edges, travelled);
             let is_clear = is_clear(field, at, POINT_RADIUS);
             let vicinity = Vicinity::around(field, at);
-            near(field, at, at, POINT_RADIUS, |col, row, node, _| {
-                if factor.holds(node - at)
-                    && (is_clear || sees(field, node, at))
-                    && let Some(length) = geodesic(&vicinity, node, at)
+            visit_near(field, at, at, POINT_RADIUS, |col, row, node, _| {
+                if factor.is_in_fan(node - at)
+                    && (is_clear || has_line_of_sight(field, node, at))
+                    && let Some(length) = geodesic_length(&vicinity, node, at)
                 {
                     set(col, row, length);
                 }
             });
         }
         for [a, b] in self.shapes.segments() {
-            near(field, a, b, LINE_RADIUS, |col, row, node, nearest| {
+            visit_near(field, a, b, LINE_RADIUS, |col, row, node, nearest| {
                 if let Some(metric) = field.metric(col, row) {
                     let (_, theta) = segment(0.0, a - node, 0.0, b - node, metric);
                     let away = (a.lerp(b, theta) - nearest).clamp_length_max(REACH);
-                    if let Some(length) = straight(field, node, nearest + away) {
+                    if let Some(length) = chord_length(field, node, nearest + away) {
                         set(col, row, length);
                     }
                 }
@@ -145,9 +145,8 @@ impl StartRegion {
         }
     }
 
-    /// The point of the region that a traveller at `at`, nearer than `radius` cells, can go to in a straight
-    /// line, and the region's value with the length of that (stored units); the shortest of them. In periodic directions
-    /// that of the nearest image of the region.
+    /// The foot of `at`: the point of the region, at most `radius` cells away and in sight, to which a straight path is the shortest;
+    /// and its length with the region's value added (stored units). In periodic directions the least over the images of the region.
     fn foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
         let far = DVec2::INFINITY;
         let (least, most) =
@@ -160,6 +159,7 @@ impl StartRegion {
         feet.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
+    /// [`foot`](Self::foot) without the images.
     fn own_foot(&self, field: &TensorField, at: DVec2, radius: f64) -> Option<(DVec2, f64)> {
         let travelled = self.value * field.root_scale();
         if self.shapes.contains(at) {
@@ -175,13 +175,14 @@ impl StartRegion {
             .copied()
             .chain(feet)
             .filter(|foot| foot.distance(at) <= radius)
-            .filter_map(|foot| Some((foot, travelled + straight(field, at, foot)?)))
+            .filter_map(|foot| Some((foot, travelled + chord_length(field, at, foot)?)))
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
-/// Open nodes within `radius` cells of the segment, each with its place beside it and its nearest point on it.
-fn near(
+/// Visits the open nodes within `radius` cells of the segment: column and row, the coordinates (of the image next to the segment, in
+/// periodic directions), and the nearest point of the segment.
+fn visit_near(
     field: &TensorField,
     a: DVec2,
     b: DVec2,
@@ -204,8 +205,8 @@ fn near(
 
 /// Length of the straight path from `a` to `b` in stored units, by Simpson's rule with five points; `None` where a
 /// wall is in the way.
-fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
-    if !sees(field, a, b) {
+fn chord_length(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
+    if !has_line_of_sight(field, a, b) {
         return None;
     }
     let by = b - a;
@@ -218,14 +219,14 @@ fn straight(field: &TensorField, a: DVec2, b: DVec2) -> Option<f64> {
 }
 
 /// Side of a vicinity in nodes: it holds the cells half a cell beyond [`POINT_RADIUS`].
-const VICINITY: usize = 2 * (POINT_RADIUS as usize + 2);
+const VICINITY_SIDE: usize = 2 * (POINT_RADIUS as usize + 2);
 
-/// The metrics of the nodes around a point: its seeds look at each some twenty times.
+/// The metrics of the nodes around a point, unpacked once: the start values around it read each some twenty times.
 struct Vicinity<'a> {
     tiling: &'a Tiling,
     /// Column and row of the first node.
     first: [isize; 2],
-    metrics: [[Option<Sym2>; VICINITY]; VICINITY],
+    metrics: [[Option<Sym2>; VICINITY_SIDE]; VICINITY_SIDE],
 }
 
 impl<'a> Vicinity<'a> {
@@ -248,19 +249,31 @@ impl<'a> Vicinity<'a> {
         self.tiling.bilinear(at, |col, row| self.metric(col, row))
     }
 
-    /// Whether all corners of the cell around a point are open that its bilinear value depends on.
+    /// The derivative of the metric at a point along a unit vector, by a central difference; zero next to walls.
+    fn slope(&self, at: DVec2, along: DVec2) -> Option<Sym2> {
+        let (least, most) = self.tiling.bounds();
+        let (before, after) = ((at - along).clamp(least, most), (at + along).clamp(least, most));
+        let length = (after - before).length();
+        if length > 0.0 && self.is_open_around(before) && self.is_open_around(after) {
+            Some((self.metric_at(after)? + self.metric_at(before)? * -1.0) * length.recip())
+        } else {
+            Some(Sym2::default())
+        }
+    }
+
+    /// Whether all nodes on which the bilinear value at a point depends are open.
     fn is_open_around(&self, at: DVec2) -> bool {
         let ends = |x: f64| [x.floor() as isize, x.ceil() as isize];
         ends(at.y).iter().all(|&row| ends(at.x).iter().all(|&col| self.metric(col, row).is_some()))
     }
 }
 
-/// Length of the geodesic between two points nearby in stored units: `d² = E − B` up to fourth order in the distance,
-/// with the energy `E = ∫ vᵀMv` of the chord `v` and what bending saves, `B = ‖Γ(v, v)‖²_D/12` by the Christoffel
-/// symbols at its middle. Both points see each other.
-fn geodesic(vicinity: &Vicinity<'_>, a: DVec2, b: DVec2) -> Option<f64> {
-    /// The expansion is no good where bending would save more than this share.
-    const MOST: f64 = 0.2;
+/// Length of the geodesic between two points nearby, in sight of each other, in stored units: `d² = E − B` up to fourth order in the
+/// distance, with the energy `E = ∫ vᵀMv` of the chord `v`, less what bending saves, `B = ‖Γ(v, v)‖²_D/12` with the Christoffel
+/// symbols `Γ` (of the first kind) at its middle.
+fn geodesic_length(vicinity: &Vicinity<'_>, a: DVec2, b: DVec2) -> Option<f64> {
+    /// Largest share `B/E`: the expansion does not hold beyond.
+    const MAX_SHARE: f64 = 0.2;
     let v = b - a;
     let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
     let mut energy = 0.0;
@@ -268,24 +281,14 @@ fn geodesic(vicinity: &Vicinity<'_>, a: DVec2, b: DVec2) -> Option<f64> {
         energy += weight / 12.0 * vicinity.metric_at(a + v * (i as f64 / 4.0))?.form(v);
     }
     let middle = a.midpoint(b);
-    let (least, most) = vicinity.tiling.bounds();
-    let slope = |by: DVec2| {
-        let (before, after) = ((middle - by).clamp(least, most), (middle + by).clamp(least, most));
-        let length = (after - before).length();
-        // Beside walls there is no telling; there the chord has to do.
-        if length > 0.0 && vicinity.is_open_around(before) && vicinity.is_open_around(after) {
-            Some((vicinity.metric_at(after)? + vicinity.metric_at(before)? * -1.0) * length.recip())
-        } else {
-            Some(Sym2::default())
-        }
-    };
-    let (mx, my) = (slope(DVec2::X)?, slope(DVec2::Y)?);
-    let bend = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
-    let saved = vicinity.metric_at(middle)?.inverse().form(bend) / 12.0;
-    Some((energy - saved.min(MOST * energy)).sqrt())
+    let (mx, my) = (vicinity.slope(middle, DVec2::X)?, vicinity.slope(middle, DVec2::Y)?);
+    // Γ(v, v) = (∂ᵥM) v − ½ ∇(vᵀMv).
+    let christoffel = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
+    let saved = vicinity.metric_at(middle)?.inverse().form(christoffel) / 12.0;
+    Some((energy - saved.min(MAX_SHARE * energy)).sqrt())
 }
 
-/// Whether no node of the cells within `radius` of a point is closed: then all points there see each other.
+/// Whether no node of the cells within `radius` of a point is closed: then all points there are in sight of each other.
 fn is_clear(field: &TensorField, at: DVec2, radius: f64) -> bool {
     let (least, most) = ((at - radius).floor(), (at + radius).floor() + 1.0);
     (least.y as isize..=most.y as isize).all(|row| {
@@ -294,7 +297,7 @@ fn is_clear(field: &TensorField, at: DVec2, radius: f64) -> bool {
     })
 }
 
-/// Whether no wall is between two points nearby, see [`in_sight`].
-pub(crate) fn sees(field: &TensorField, a: DVec2, b: DVec2) -> bool {
+/// Whether no wall lies between two points nearby, see [`in_sight`].
+pub(crate) fn has_line_of_sight(field: &TensorField, a: DVec2, b: DVec2) -> bool {
     in_sight(a, b, |col, row| field.tiling.node(col, row).is_none_or(|(c, r)| field.is_open(c, r)))
 }

@@ -20,7 +20,7 @@ pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
     let mut at = goal;
     let mut line = vec![goal];
     let home = loop {
-        if let Some(foot) = distance.straight_home(at, value) {
+        if let Some(foot) = distance.straight_foot(at, value) {
             break foot;
         }
         let next = follow(distance, at, value)
@@ -29,7 +29,7 @@ pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
         match next {
             Some((next, lower)) if lower < value => (at, value) = (next, lower),
             // Near the start an anisotropic distance may have no lower node in reach.
-            _ => break distance.centre_in_sight(at)?,
+            _ => break distance.factor_point_in_sight(at)?,
         }
         line.push(at);
     };
@@ -200,7 +200,7 @@ mod tests {
         for goal in [DVec2::new(40.2, 20.4), DVec2::new(20.5, 55.5), DVec2::new(50.7, 50.2)] {
             let line = check(&distance, start, goal);
             for ends in line.windows(2) {
-                assert!(crate::eikonal::sees(&distance.field, ends[0], ends[1]));
+                assert!(crate::eikonal::has_line_of_sight(&distance.field, ends[0], ends[1]));
             }
         }
     }

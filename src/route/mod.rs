@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
 use crate::eikonal::DistanceMap;
-use crate::eikonal::{TensorField, sees};
+use crate::eikonal::{TensorField, has_line_of_sight};
 use crate::error::{Error, Location, Result};
 use crate::linalg::Sym2;
 use crate::metric::MetricField;
@@ -76,7 +76,9 @@ fn shortest(
         .at(Location::Grid(goal)));
     }
     let inside = |at| field.tiling.contains(at);
-    let clear = |a, b| inside(a) && inside(b) && (is_open_around(field, a, b) || sees(field, a, b));
+    let clear = |a, b| {
+        inside(a) && inside(b) && (is_open_around(field, a, b) || has_line_of_sight(field, a, b))
+    };
     let line = descent::line(distance, goal);
     Ok(line.map(|line| polish::polish(&line, metric, &clear)))
 }

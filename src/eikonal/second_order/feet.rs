@@ -1,10 +1,10 @@
-//! Where values come from, and what the functional says there.
+//! Feet: where values come from, and the defect of the functional there.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use super::first_order::FirstOrder;
 use super::functional::{FactorAt, Foot};
-use super::halo::{MARGIN, Strip, WIDE, fill, rings_of, seen};
+use super::halo::{BatchBlock, MARGIN, WIDTH, at_offset, fill, rings_of};
 use super::triangle::LaneTriangle;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::{RING, ring_of};
@@ -15,22 +15,22 @@ use crate::grid::tiling::{AREA, SIDE};
 use crate::linalg::lanes::{Lanes, choose_bits as choose, lanes};
 use crate::linalg::simd::{self, Kernel};
 
-/// Where the values of a tile's nodes come from, and what the functional of second order adds there; by rows or, where
-/// `by_columns`, by columns.
+/// The feet of a tile's nodes, that is where their values come from, and the defects `ρ` there; stored row by row or, where
+/// `by_columns`, column by column.
 #[derive(Clone)]
 pub(super) struct Feet {
-    /// Bits of a [`LaneTriangle`] and above them the share of the diagonal neighbour, in [`SHARES`]. Transport reads all feet of a
-    /// grid, which no cache near by holds: with a number for each it took longer.
+    /// The bits of a [`LaneTriangle`], and above them the share `θ` of the diagonal neighbour in units of `1/`[`SHARES`]. Transport
+    /// reads all feet of a grid, more than the caches hold: unpacked, it took longer.
     packed: [u16; AREA],
     pub(super) defect: [f32; AREA],
-    /// Whether most comes along the rows, and then whether it comes from the end of the columns or rows.
+    /// Whether most values come from along the rows (transport then sweeps column by column), and whether sweeps begin at the last line.
     pub(super) by_columns: bool,
     pub(super) descending: bool,
-    /// What each line reads, in bits.
+    /// Which lines each line reads: [`BEFORE`], [`ITSELF`] and [`BEHIND`].
     pub(super) reads: [u8; SIDE],
 }
 
-/// Steps of a share that has twelve bits: the second round sees what that leaves in the first, and carries little itself.
+/// Largest share in twelve bits: the second round corrects the rounding of the first, and carries little itself.
 const SHARES: f32 = 4095.0;
 
 /// Bits of the lines that a line reads: the one before it, itself, the one behind.
@@ -38,31 +38,31 @@ pub(super) const BEFORE: u32 = 1;
 pub(super) const ITSELF: u32 = 2;
 pub(super) const BEHIND: u32 = 4;
 
-/// What the feet of a tile are made from.
+/// What the feet of a tile are found from.
 pub(super) struct Input<'a> {
     pub(super) solution: &'a FirstOrder<'a>,
-    /// Corrections of the rounds before; none in the first.
+    /// Sum of the corrections of the rounds before; `None` in the first.
     pub(super) total: Option<&'a [[f32; AREA]]>,
 }
 
-/// What surrounds tiles side by side.
+/// What finding the feet of a batch reads, on the batch and its halo.
 pub(super) struct Surroundings {
-    g: Strip,
-    e: Strip,
+    g: BatchBlock,
+    e: BatchBlock,
     /// `M` as xx, xy, yy, and its determinant; 0 where closed.
-    metric: [Strip; 4],
+    metric: [BatchBlock; 4],
 }
 
 impl Default for Surroundings {
     fn default() -> Self {
-        let strip = [[0.0; WIDE]; SIDE + 2 * MARGIN];
-        Self { g: strip, e: strip, metric: [strip; 4] }
+        let batch = [[0.0; WIDTH]; SIDE + 2 * MARGIN];
+        Self { g: batch, e: batch, metric: [batch; 4] }
     }
 }
 
 impl Surroundings {
-    /// Finds the feet of tiles side by side, `first` and those after it, given those of the round before; and the neighbours
-    /// that each reads, one bit each as in [`RING`].
+    /// Finds the feet of a batch, the tile `first` and those after it, given those of the round before; and the neighbours
+    /// that each tile reads, one bit each as in [`RING`].
     pub(super) fn find(
         &mut self,
         input: &Input<'_>,
@@ -133,7 +133,7 @@ impl Feet {
         self.defect[places.clone()].copy_from_slice(&line.defect);
         let mut packed = [0; SIDE];
         for i in 0..SIDE {
-            // The last bits of a number beyond 2²³ count ones: a conversion would saturate, which is not done lane by lane.
+            // The last bits of an `f32` from 2²³ on are its units: this rounds, while `as` would saturate, which is not vectorised.
             let share = (line.theta[i] * SHARES + 8_388_608.0).to_bits() & 0xfff;
             packed[i] = (share << LaneTriangle::BITS | line.triangle[i]) as u16;
         }
@@ -157,7 +157,7 @@ impl Feet {
 
 /// Makes `M = D⁻¹` as xx, xy, yy and its determinant, 0 where closed, from `D` as xx, xy, det.
 struct Invert<'a> {
-    metric: &'a mut [Strip; 4],
+    metric: &'a mut [BatchBlock; 4],
 }
 
 impl Kernel for Invert<'_> {
@@ -167,7 +167,7 @@ impl Kernel for Invert<'_> {
     fn run(self) {
         let [xx, xy, yy, det] = self.metric;
         for row in MARGIN - 1..SIDE + MARGIN + 1 {
-            for i in 0..WIDE {
+            for i in 0..WIDTH {
                 let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], yy[row][i]);
                 let (open, inverse) = (ddet > 0.0, 1.0 / (dxx * ddet));
                 let idet = dxx * inverse;
@@ -180,18 +180,18 @@ impl Kernel for Invert<'_> {
     }
 }
 
-/// How much higher than the nodes of a row those at places from them are.
+/// How much higher the (corrected) values at offsets from the nodes of a row are than those of the nodes.
 #[inline(always)]
 fn rises<const N: usize>(
-    g: &Strip,
-    e: &Strip,
+    g: &BatchBlock,
+    e: &BatchBlock,
     at: (usize, usize),
     places: [(i32, i32); N],
 ) -> [Lanes; N] {
-    let (g0, e0) = (seen(g, at, (0, 0)), seen(e, at, (0, 0)));
+    let (g0, e0) = (at_offset(g, at, (0, 0)), at_offset(e, at, (0, 0)));
     let mut rises = [[0f32; SIDE]; N];
     for k in 0..N {
-        let (g1, e1) = (seen(g, at, places[k]), seen(e, at, places[k]));
+        let (g1, e1) = (at_offset(g, at, places[k]), at_offset(e, at, places[k]));
         for i in 0..SIDE {
             rises[k][i] = (g1[i] - g0[i]) + (e1[i] - e0[i]);
         }
@@ -199,10 +199,10 @@ fn rises<const N: usize>(
     rises
 }
 
-/// Finds the feet of a tile, if `again` from those of the round before; comes to the neighbours that it reads.
+/// Finds the feet of a tile, if `again` from those of the round before; the output is the neighbours that it reads.
 struct Find<'a, const IS_FACTORED: bool> {
     around: &'a Surroundings,
-    /// The column of the strip at which the tile begins.
+    /// The column of the batch at which the tile begins.
     from: usize,
     tile: Tile<'a>,
     size: [usize; 2],
@@ -216,7 +216,7 @@ impl<const IS_FACTORED: bool> Kernel for Find<'_, IS_FACTORED> {
     #[inline(always)]
     fn run(self) -> u8 {
         let Self { around, from, tile, size, again, feet } = self;
-        let mut course = Course::default();
+        let mut dependencies = Dependencies::default();
         if again && feet.by_columns {
             feet.transpose();
         }
@@ -228,20 +228,21 @@ impl<const IS_FACTORED: bool> Kernel for Find<'_, IS_FACTORED> {
                 let found = find_line::<IS_FACTORED>(around, (from, row), &tile, &line);
                 steps -= 1;
                 if !moved && found.is_elsewhere(&line) {
-                    // Seldom. With one step, the error near the pole of a sphere falls with order 0.9 instead of 1.3.
+                    // Seldom: two Newton steps from the first-order foot. With one, the error near the pole of a sphere falls with order 0.9
+                    // instead of 1.3.
                     (moved, steps, line) = (true, 2, Line::UNKNOWN);
                 } else {
                     (moved, line) = (true, found);
                 }
             }
-            course.add(row, &line);
+            dependencies.add(row, &line);
             feet.set_line(row, &line);
         }
-        course.set(feet, size)
+        dependencies.set(feet, size)
     }
 }
 
-/// The feet of a row or column of a tile: bits of a [`LaneTriangle`], the share of the diagonal neighbour, and what the functional adds.
+/// The feet of a row or column of a tile: bits of a [`LaneTriangle`], the share `θ` of the diagonal neighbour, and the defect `ρ`.
 pub(super) struct Line {
     pub(super) triangle: [u32; SIDE],
     pub(super) theta: Lanes,
@@ -284,17 +285,17 @@ fn find_line<const IS_FACTORED: bool>(
         origin = [(first.x - factor.at.x) as f32, (first.y + row as f64 - factor.at.y) as f32];
     }
     let ring = rises(g, e, at, RING);
-    // Beside the axis neighbours, two lines from that of the node, on either side.
+    // The nodes that follow `b` on its line, two lines from that of the node; one for each place of `a`.
     let ahead = rises(g, e, at, [(1, -2), (-2, 1), (-1, -2), (-2, -1)]);
     let behind = rises(g, e, at, [(1, 2), (2, 1), (-1, 2), (2, -1)]);
     let metrics = [rings_of(xx, at), rings_of(xy, at), rings_of(yy, at)];
     let own = (0, 0);
-    let (xx, xy, yy) = (seen(xx, at, own), seen(xy, at, own), seen(yy, at, own));
-    let (g, det) = (seen(g, at, own), seen(det, at, own));
+    let (xx, xy, yy) = (at_offset(xx, at, own), at_offset(xy, at, own), at_offset(yy, at, own));
+    let (g, det) = (at_offset(g, at, own), at_offset(det, at, own));
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
     let [_, _, dets] = tensors;
     let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], defect: [0.0; SIDE] };
-    // The triangles first: in one loop with the rest 2 % slower.
+    // The triangles first: in one loop with the rest it was 2 % slower.
     let (mut slopes, mut on) = ([0.0; SIDE], [0.0; SIDE]);
     for i in 0..SIDE {
         let mut shifted = ring_of(&ring, i);
@@ -330,12 +331,12 @@ fn find_line<const IS_FACTORED: bool>(
             factor: FactorAt::new(
                 on[i],
                 triangle.mirror(m0),
-                triangle.mirror_place([origin[0] + i as f32, origin[1]]),
+                triangle.mirror_vector([origin[0] + i as f32, origin[1]]),
             ),
             known: choose(before.triangle[i] == bits, before.theta[i], -1.0),
         };
         let (theta, defect) = foot.minimise::<IS_FACTORED>();
-        // Beyond the seam of a periodic grid a value is seen, but belongs to another tile.
+        // Beyond the seam of a periodic grid a value can be read, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
         line.triangle[i] = if fixed { LaneTriangle::NONE } else { bits };
         line.theta[i] = choose(fixed, 0.0, theta);
@@ -344,20 +345,19 @@ fn find_line<const IS_FACTORED: bool>(
     line
 }
 
-/// What the rows and the columns of a tile read, and the sum of the directions from the nodes to where their values
-/// come from.
+/// Which lines the rows and the columns of a tile read, and the sum of the directions from the nodes to their feet.
 ///
-/// Aligned, and with it all that [`find`] puts aside on the stack: where that lay across cache lines, high accuracy took 3 % longer.
+/// Aligned, which aligns all that [`Find`] keeps on the stack: where that lay across cache lines, high accuracy took 3 % longer.
 #[derive(Default)]
 #[repr(align(64))]
-struct Course {
+struct Dependencies {
     rows: [u8; SIDE],
     cols: [u32; SIDE],
     east: [i32; SIDE],
     south: [i32; SIDE],
 }
 
-impl Course {
+impl Dependencies {
     /// Adds a row.
     #[inline(always)]
     fn add(&mut self, row: usize, line: &Line) {
@@ -368,7 +368,7 @@ impl Course {
             let (negative, along_y) = (triangle.negative.is_yes(), triangle.along_y.is_yes());
             let backwards = triangle.backwards().is_yes();
             let fixed = triangles[i] == LaneTriangle::NONE;
-            // Along the axis the line of both neighbours, across it the own one, that of the diagonal neighbour, or both.
+            // Along the axis of `a`, the line that holds both neighbours; across it the own line, that of `b`, or both.
             let bit = |negative: bool| if negative { BEFORE } else { BEHIND };
             let own = if thetas[i] < 1.0 { ITSELF } else { 0 };
             let other = if thetas[i] > 0.0 { bit(backwards) } else { 0 };
@@ -408,7 +408,7 @@ impl Course {
         self.rows[row] = reads as u8;
     }
 
-    /// Sets the feet's way of being swept; the neighbouring tiles that they read.
+    /// Sets how the feet are to be swept; returns the neighbouring tiles that they read.
     #[inline(always)]
     fn set(&self, feet: &mut Feet, size: [usize; 2]) -> u8 {
         let mut cols = [0u8; SIDE];
@@ -417,7 +417,7 @@ impl Course {
         }
         let (east, south) = (self.east.iter().sum::<i32>(), self.south.iter().sum::<i32>());
         let reads = neighbours_read(size, feet, &self.rows, &cols);
-        // By columns where most comes along the rows, and against the direction it comes from.
+        // By columns where most values come along the rows, beginning on the side they come from.
         feet.by_columns = east.abs() > south.abs();
         if feet.by_columns {
             (feet.descending, feet.reads) = (east > 0, cols);

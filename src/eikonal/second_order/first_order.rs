@@ -1,4 +1,4 @@
-//! The first-order solution that is corrected.
+//! What the correction starts from.
 
 use super::super::factors::Factors;
 use super::super::schedule::values::Values;

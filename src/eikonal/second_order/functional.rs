@@ -1,6 +1,7 @@
-//! The functional of second order at a node and its least over the segment that the value comes from.
+//! The functional of second order at a node and its minimum over the segment that the value comes from.
 //!
-//! All triangles are mirrored onto one: with the axis neighbour `a` at (1, 0) and the diagonal one `b` at (1, 1).
+//! All triangles are mirrored onto one: with the axis neighbour `a` at (1, 0) and the diagonal one `b` at (1, 1), so that the
+//! step to the foot is `v = (1, θ)`.
 
 use crate::linalg::lanes::{choose_bits as choose, greatest, inverse_root, least};
 
@@ -19,7 +20,7 @@ impl Quadratic {
         greatest(self.at(t), 0.0).sqrt()
     }
 
-    /// The root and its first two derivatives, to five digits: they only lead to the foot, whose error counts squared.
+    /// The root and its first two derivatives in `θ`, to five digits: they only locate the foot, whose error counts squared.
     #[inline(always)]
     fn jet(self, t: f32) -> [f32; 3] {
         let square = greatest(self.at(t), 1e-12);
@@ -29,12 +30,14 @@ impl Quadratic {
     }
 }
 
-/// The factor seen from a node at `v` from its point, times `on`.
+/// The factor `g0` around a node at `v` from the point of the factor, times `on` (1 where it applies, else 0).
 #[derive(Clone, Copy)]
 pub(super) struct FactorAt {
     on: f32,
+    /// `M(s)` at the point of the factor.
     m0: Quadratic,
     v: [f32; 2],
+    /// `M(s) v`, `g0²` and `g0` at the node.
     mv: [f32; 2],
     g2: f32,
     g: f32,
@@ -55,9 +58,9 @@ impl FactorAt {
         self.on * more / (self.g + greatest(self.g2 + more, 0.0).sqrt())
     }
 
-    /// The square of the distance from the factor's point to `x + (1, θ)`.
+    /// `g0²` at `x + (1, θ)`.
     #[inline(always)]
-    fn far(&self) -> Quadratic {
+    fn square(&self) -> Quadratic {
         let Quadratic(xx, xy, yy) = self.m0;
         let [x, y] = [self.v[0] + 1.0, self.v[1]];
         let (mx, my) = (xx * x + xy * y, xy * x + yy * y);
@@ -68,9 +71,9 @@ impl FactorAt {
 /// What a node's functional is made of.
 #[derive(Clone, Copy)]
 pub(super) struct Foot {
-    /// How much the neighbours at (1, 0), (1, 1), (1, −1) and (1, 2) are above the node; a large value where unreached.
+    /// By how much the values at (1, 0), (1, 1), (1, −1) and (1, 2) exceed that of the node; a large number where unreached.
     pub(super) rise: [f32; 4],
-    /// The difference between the first two as the first-order update reads it.
+    /// `g(b) − g(a)` as the first-order update reads it, factoring terms included.
     pub(super) slope: f32,
     /// `M` at the node and at the neighbours `a` and `b`; 0 where closed.
     pub(super) here: Quadratic,
@@ -96,15 +99,15 @@ impl Foot {
         let (has_a, has_b) = (ra < 1e17, rb < 1e17);
         let free = has_a & has_b;
         let curvature = choose(free, curvature(wa, wb, wc, wd, rc < 1e17, rd < 1e17), 0.0);
-        // Between a node and a wall there is only the node.
+        // Where one of `a` and `b` is not reached, the foot is the other.
         let lo = choose(has_a, 0.0, 1.0);
         let hi = choose(has_b, 1.0, lo);
         let base = choose(has_a, wa, wb);
         let rise = choose(free, wb - wa, 0.0);
-        let (ca, cb) = (open(self.at_a, here), open(self.at_b, here));
-        let far = factor.far();
+        let (metric_a, metric_b) = (open(self.at_a, here), open(self.at_b, here));
+        let g0_square = factor.square();
 
-        // The first-order foot, see `segment`.
+        // The first-order foot, see `segment`: here γ = wᵀMw, β = aᵀMw and α = aᵀMa.
         let d = choose(free, slope, 0.0);
         let inverse = inverse_root(here.2);
         let middle = here.1 * (inverse * inverse);
@@ -113,18 +116,21 @@ impl Foot {
         let phi = -d * across * inverse_root(greatest(across * steep, 1e-30));
         let first_order = phi - middle;
         let t = greatest(lo, least(hi, choose(known >= 0.0, known, first_order)));
-        let ([_, p0, h0], [va, pa, ha], [vb, pb, hb]) = (here.jet(t), ca.jet(t), cb.jet(t));
-        let (mut pc, mut hc) = (0.0, 0.0);
+        // Lengths ‖v‖ and their derivatives in θ under the metrics at x, a and b; then those of C(θ) by the product rule.
+        let ([_, d1_x, d2_x], [l_a, d1_a, d2_a], [l_b, d1_b, d2_b]) =
+            (here.jet(t), metric_a.jet(t), metric_b.jet(t));
+        let (mut d1_g0, mut d2_g0) = (0.0, 0.0);
         if IS_FACTORED {
-            let [_, first, second] = far.jet(t);
-            (pc, hc) = (factor.on * first, factor.on * second);
+            let [_, first, second] = g0_square.jet(t);
+            (d1_g0, d2_g0) = (factor.on * first, factor.on * second);
         }
-        let first = pc + rise - 0.5 * (1.0 - 2.0 * t) * curvature
-            + 0.5 * (p0 + pa + t * (pb - pa) + vb - va);
-        let second = hc + curvature + 0.5 * (h0 + ha + t * (hb - ha) + 2.0 * (pb - pa));
+        let first = d1_g0 + rise - 0.5 * (1.0 - 2.0 * t) * curvature
+            + 0.5 * (d1_x + d1_a + t * (d1_b - d1_a) + l_b - l_a);
+        let second =
+            d2_g0 + curvature + 0.5 * (d2_x + d2_a + t * (d2_b - d2_a) + 2.0 * (d1_b - d1_a));
         let step = choose(second > 1e-6, first / second, 0.0);
         let t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
-        let length = 0.5 * (here.root(t) + (1.0 - t) * ca.root(t) + t * cb.root(t));
+        let length = 0.5 * (here.root(t) + (1.0 - t) * metric_a.root(t) + t * metric_b.root(t));
         let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
         let mut defect = base + t * rise + length - bend;
         if IS_FACTORED {
@@ -134,7 +140,7 @@ impl Foot {
     }
 }
 
-/// `M` at a neighbour, at the node itself where that is closed.
+/// `M` at a neighbour; where that is closed, `M` at the node.
 #[inline(always)]
 fn open(there: Quadratic, here: Quadratic) -> Quadratic {
     let open = there.0 > 0.0;
@@ -145,8 +151,8 @@ fn open(there: Quadratic, here: Quadratic) -> Quadratic {
     )
 }
 
-/// Second difference along the ring at the segment between `a` and `b`: the mean of those at both, limited (MC) so that
-/// a kink does not bend what is straight.
+/// Second difference `S` along the ring at the segment between `a` and `b`: the mean of those at both ends, with the MC limiter (van
+/// Leer), so that a kink beyond one end does not curve a straight segment.
 #[inline(always)]
 fn curvature(a: f32, b: f32, before: f32, after: f32, has_before: bool, has_after: bool) -> f32 {
     let (at_a, at_b) = (b - 2.0 * a + before, after - 2.0 * b + a);

@@ -9,16 +9,16 @@
 //! ```
 //!
 //! with the metric by the trapezoidal rule along the step, `w = g − g0` curved between the two by its limited
-//! second difference `S`, and the cone `g0` (see [`mod@super::stencil::factoring`]) exact. What the functional says more than
-//! the value itself, the defect `ρ = F − g`, travels with the front: the correction solves the linear equation
+//! second difference `S`, and the source factor `g0` (see [`mod@super::stencil::factoring`]) exact. The defect `ρ = F − g`, by
+//! which the functional exceeds the value itself, travels with the front: the correction solves the linear equation
 //!
 //! ```text
 //!   e(x) = (1−θ) e(a) + θ e(b) + ρ(x).
 //! ```
 //!
-//! Feet are frozen, so there is nothing that could oscillate: `e` is a sum of `ρ` along feet, and `|S/8| ≤ C/2`. A foot is
-//! the least point of its functional, so that an error in it counts only squared. A second round with `g + e` brings
-//! most of what is left.
+//! Feet are frozen, so that nothing can oscillate: `e` is a sum of `ρ` along feet, and `|S/8| ≤ C/2`. A foot is
+//! the minimum point of its functional, so that an error in it counts only squared. A second round with `g + e` in place of `g`
+//! removes most of the error that is left.
 
 mod domain;
 mod feet;
@@ -39,16 +39,17 @@ use crate::error::Result;
 use crate::grid::tiling::AREA;
 use crate::linalg::lanes::greatest;
 
-/// The transport of the two rounds stands still when nothing changes by more than this many mean cells. What the first
-/// leaves undone the second sees. In a prototype the first round left .3 to 7 % of the first-order error, the
+/// The transport of each of the two rounds has converged when nothing changes by more than this many mean cells. What the first
+/// leaves, the second corrects. In a prototype the first round left .3 to 7 % of the first-order error, the
 /// second gained up to a factor of 6 at ratios of 100 and more, and further ones little.
 const TOLERANCE_CELLS: [f32; 2] = [1e-4, 1e-5];
 
 /// What brings first-order values to second order; zero at nodes of the start.
 #[derive(Clone, Debug)]
 pub(super) struct Correction {
+    /// The sum of both rounds.
     total: Vec<[f32; AREA]>,
-    /// What the first round brought.
+    /// That of the first round.
     first: Vec<[f32; AREA]>,
 }
 
@@ -82,7 +83,7 @@ impl Correction {
         Self::in_two_rounds(Domain::around(solution, changed), first, second, control)
     }
 
-    /// Corrects the domain, and what the correction is carried to, from what the rounds brought before.
+    /// Corrects the domain, and what the correction is carried to, starting from the rounds before the edit.
     fn in_two_rounds(
         mut domain: Domain<'_>,
         first: Vec<[f32; AREA]>,
@@ -99,7 +100,7 @@ impl Correction {
         total.par_iter_mut().zip(&first).enumerate().for_each(|(tile, (total, first))| {
             let values = values.tile(tile);
             for i in 0..AREA {
-                // On ground so rough that the transport does not converge no distance is to be negative either.
+                // Not below −g: no distance is to be negative, also where the field is so rough that the transport does not converge.
                 total[i] = greatest(total[i] + first[i], -values[i]);
             }
         });
@@ -111,8 +112,8 @@ impl Correction {
         self.total[tile][place]
     }
 
-    /// What may be wrong with a corrected value: the last round's change, the share of the correction that is typically
-    /// left after it, and rounding.
+    /// Estimate of the error of a corrected value: the change by the last round, the share of the correction that typically
+    /// remains as error after it, and rounding.
     pub(super) fn error_left(&self, tile: usize, place: usize, value: f32) -> f32 {
         const SHARE_LEFT: f32 = 0.1;
         let (total, first) = (self.total[tile][place], self.first[tile][place]);
@@ -120,8 +121,8 @@ impl Correction {
     }
 }
 
-/// A round of correction in a domain, from the correction `e` that was there before the edit. `total` is that of the rounds before;
-/// none in the first. The domain grows by what the correction is carried to.
+/// A round of correction in a domain, starting from the correction `e` of the same round before the edit. `total` is the sum of the
+/// earlier rounds, `None` in the first. The domain grows by what the correction is carried to.
 fn round(
     domain: &mut Domain<'_>,
     mut e: Vec<[f32; AREA]>,

@@ -1,4 +1,4 @@
-//! The eight triangles around a node, another in each lane, mirrored onto one.
+//! The eight triangles around a node, mirrored onto one; each lane may have a different triangle.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
@@ -72,7 +72,7 @@ impl LaneTriangle {
         self.side(ring[0], ring[2], ring[4], ring[6])
     }
 
-    /// Those at `b` and at the other diagonal neighbour beside `a`.
+    /// Those at `b` and at the other diagonal neighbour next to `a`.
     #[inline(always)]
     pub(super) fn diagonals(self, [_, se, _, sw, _, nw, _, ne]: [f32; 8]) -> [f32; 2] {
         let rising = self.negative.choose(nw, se);
@@ -87,9 +87,9 @@ impl LaneTriangle {
         Quadratic(along_y.choose(yy, xx), self.falling.negate(xy), along_y.choose(xx, yy))
     }
 
-    /// A place mirrored likewise.
+    /// A vector mirrored likewise.
     #[inline(always)]
-    pub(super) fn mirror_place(self, [x, y]: [f32; 2]) -> [f32; 2] {
+    pub(super) fn mirror_vector(self, [x, y]: [f32; 2]) -> [f32; 2] {
         let (along, across) = (self.along_y.choose(y, x), self.along_y.choose(x, y));
         [self.negative.negate(along), self.backwards().negate(across)]
     }
@@ -107,7 +107,7 @@ impl LaneTriangle {
         let ring = without_cut_corners(ring);
         let mut best = Best { value: f32::INFINITY, triangle: 0, slope: 0.0 };
         for_each_triangle!(t => {
-            // aᵀMw, wᵀMw and what is 1/‖a‖ and 1/‖w‖.
+            // aᵀMw, 1/‖a‖ and 1/‖w‖, ‖b‖ and 1/‖b‖.
             let aw = if t.falling { -xy } else { xy };
             let ww = if t.along_y { xx } else { yy };
             let [inv_a, inv_w] =

@@ -1,4 +1,4 @@
-//! The update of one node in plain form: the judge of the fast kernels, and the step back for routes.
+//! The update of one node in plain form: for the reference solver, and for the step back along a route.
 
 use glam::DVec2;
 
@@ -17,7 +17,7 @@ pub(crate) fn best_foot(ring: [f32; 8], terms: [f64; 8], metric: Sym2) -> Option
         for diagonal in [axis + 1, (axis + 7) % 8] {
             let Triangle { a, b, .. } = Triangle::new(axis, diagonal);
             let (ga, gb) = (f64::from(ring[a]) + terms[a], f64::from(ring[b]) + terms[b]);
-            // No path is shorter than what it adds to.
+            // The minimum over a segment is no less than the smaller of its two values.
             if best.is_some_and(|(least, _)| ga.min(gb) >= least) {
                 continue;
             }

@@ -14,7 +14,7 @@ use crate::linalg::lanes::{Lanes, lanes, least};
 pub(crate) const RING: [(i32, i32); 8] =
     [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// The triangle between a node, an axis neighbour `a` and a diagonal neighbour `b` beside that.
+/// The triangle between a node, an axis neighbour `a` and a diagonal neighbour `b` next to `a`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangle {
     /// Place of `a` on the ring.
@@ -36,7 +36,7 @@ impl Triangle {
     }
 }
 
-/// All eight, each beside the one that mirrors it in the node: the two have the same `D` and the same coefficients.
+/// All eight, each followed by its point reflection through the node: the two have the same coefficients.
 pub(crate) const TRIANGLES: [Triangle; 8] = [
     Triangle::new(0, 1),
     Triangle::new(4, 5),
@@ -48,7 +48,7 @@ pub(crate) const TRIANGLES: [Triangle; 8] = [
     Triangle::new(6, 7),
 ];
 
-/// Does the same with each of the [`TRIANGLES`]. Written out, since the compiler would unroll a loop too late to do many nodes at a time.
+/// Evaluates the body for each of the [`TRIANGLES`]. Written out, since the compiler would unroll a loop too late to vectorise over nodes.
 macro_rules! for_each_triangle {
     ($t:ident => $body:expr) => {
         for_each_triangle!(@ $t => $body, 0 1 2 3 4 5 6 7)
@@ -78,33 +78,33 @@ pub(crate) fn without_cut_corners([e, se, s, sw, w, nw, n, ne]: [f32; 8]) -> [f3
     ]
 }
 
-/// A diagonal neighbour, hidden where both axis neighbours beside the step to it are closed.
+/// A diagonal neighbour; infinite where both axis neighbours of the node that are next to it are closed.
 #[inline(always)]
 fn unless_cut(diagonal: f32, a: f32, b: f32) -> f32 {
     if least(a, b) < f32::INFINITY { diagonal } else { f32::INFINITY }
 }
 
-/// The rings of [`LANES`](crate::linalg::lanes::LANES) nodes side by side, place by place: those of the middle one of three lines, from
-/// the one at `first` on.
+/// The rings of [`LANES`](crate::linalg::lanes::LANES) consecutive nodes of the middle one of three lines, from `first` on: for each place of
+/// the ring a number in each lane.
 #[inline(always)]
 pub(crate) fn rings<const N: usize>(
     [above, here, below]: [&[f32; N]; 3],
     first: usize,
 ) -> [Lanes; 8] {
-    let (before, behind) = (first - 1, first + 1);
+    let (before, after) = (first - 1, first + 1);
     [
-        lanes(here, behind),
-        lanes(below, behind),
+        lanes(here, after),
+        lanes(below, after),
         lanes(below, first),
         lanes(below, before),
         lanes(here, before),
         lanes(above, before),
         lanes(above, first),
-        lanes(above, behind),
+        lanes(above, after),
     ]
 }
 
-/// The ring of one of them.
+/// The ring of node `i` of them.
 #[inline(always)]
 pub(crate) fn ring_of([e, se, s, sw, w, nw, n, ne]: &[Lanes; 8], i: usize) -> [f32; 8] {
     [e[i], se[i], s[i], sw[i], w[i], nw[i], n[i], ne[i]]

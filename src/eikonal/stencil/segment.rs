@@ -1,15 +1,15 @@
-//! The least over one segment of the ring: in plain form, and in the closed form of the fast kernels.
+//! The minimum over one segment of the ring: in plain form, and in the closed form of the fast kernels.
 
 use glam::DVec2;
 
 use crate::linalg::Sym2;
 use crate::linalg::lanes::{greatest, least};
 
-/// The least of `(1−θ) ga + θ gb + ‖(1−θ) a + θ b‖_M` over `0 ≤ θ ≤ 1`, and the `θ`.
+/// The minimum of `(1−θ) ga + θ gb + ‖(1−θ) a + θ b‖_M` over `0 ≤ θ ≤ 1`, and its `θ`.
 ///
-/// With `w = b − a` the length is `√(ww φ² + c)` in `φ = θ + aw/ww`, a hyperbola; its slope `ww φ/√(ww φ² + c)`
-/// meets `−d`, `d = gb − ga`, at `φ = −d √(c / (ww (ww − d²)))`. The sum is convex, so an end is best when
-/// that lies outside.
+/// Let `w = b − a`, `d = gb − ga`, `ww = wᵀMw`, `aw = aᵀMw` and `c = aᵀMa − aw²/ww`. The length is `√(ww φ² + c)` with
+/// `φ = θ + aw/ww`; its slope `ww φ/√(ww φ² + c)` is `−d` at `φ = −d √(c / (ww (ww − d²)))`. The sum is convex, so that an end is
+/// best when this lies outside the segment.
 pub(crate) fn segment(ga: f64, a: DVec2, gb: f64, b: DVec2, metric: Sym2) -> (f64, f64) {
     let w = b - a;
     let d = gb - ga;
@@ -36,8 +36,8 @@ pub(crate) fn segment(ga: f64, a: DVec2, gb: f64, b: DVec2, metric: Sym2) -> (f6
 ///   t(d) = (β/s) d + √(1/s − (det D/s²) d²)
 /// ```
 ///
-/// It is the least over the segment where the slope of the sum (see [`segment`]) changes sign between the ends:
-/// `lo ≤ d ≤ hi` with `lo = −bᵀMw/‖b‖`, `hi = −aᵀMw/‖a‖`. Outside, the least is at an end.
+/// It is the minimum over the segment where the slope of the sum (see [`segment()`]) changes sign between the ends:
+/// `lo ≤ d ≤ hi` with `lo = −bᵀMw/‖b‖`, `hi = −aᵀMw/‖a‖`. Otherwise the minimum is at an end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ClosedForm {
     pub(crate) inv_s: f32,
@@ -48,7 +48,7 @@ pub(crate) struct ClosedForm {
 }
 
 impl ClosedForm {
-    /// The value through the segment; where the least is at an end, not below that.
+    /// The value through the segment; where the minimum is at an end, no less than the value through that end.
     #[inline(always)]
     pub(crate) fn through(self, ga: f32, gb: f32) -> f32 {
         let Self { inv_s, det_over_s2, beta_over_s, lo, hi } = self;

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::*;
 use crate::control::Control;
 use crate::eikonal::{DistanceMap, Solver, Stop};
-use crate::eikonal::{TensorField, sees};
+use crate::eikonal::{TensorField, has_line_of_sight};
 use crate::route::descent;
 
 const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
@@ -30,7 +30,7 @@ fn polished(
 ) -> [Vec<DVec2>; 2] {
     let last = DVec2::splat((distance.cols() - 1) as f64);
     let inside = |p: DVec2| p.cmpge(DVec2::ZERO).all() && p.cmple(last).all();
-    let clear = |a, b| inside(a) && inside(b) && sees(&distance.field, a, b);
+    let clear = |a, b| inside(a) && inside(b) && has_line_of_sight(&distance.field, a, b);
     let line = descent::line(distance, goal).unwrap();
     let polished = polish(&line, &metric, &clear);
     assert_eq!((polished[0], polished[polished.len() - 1]), (line[0], goal));
