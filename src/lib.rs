@@ -35,7 +35,7 @@
 //! * [`terrain`]: [`Terrain::open`] reads GeoTIFF, ESRI ASCII grids and SRTM tiles; [`synthetic`] makes terrains
 //!   with known answers. Heights are metres, voids `NaN`, row 0 is north.
 //! * [`surface`]: [`HeightSurface::fit`] makes the tensor-product B-spline `z(x, y)`; a [`HeightJet`] is its value and
-//!   exact derivatives at a point, [`surface::Curvature`] what they say of the shape. What follows takes any [`Surface`]: a
+//!   exact derivatives at a point, [`surface::PrincipalCurvatures`] what they say of the shape. What follows takes any [`Surface`]: a
 //!   [`NurbsGrid`] and a user's own as well.
 //! * [`metric`]: [`Metric::on`] binds a metric to a surface, [`Isotropic`], [`Curvature`], [`Difference`] or a user's own:
 //!   [`MetricField::speed`] is the tensor `D` there.

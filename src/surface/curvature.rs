@@ -12,7 +12,7 @@ use crate::linalg::simd::Kernel;
 
 /// Curvatures of a surface at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Curvature {
+pub struct PrincipalCurvatures {
     /// Gaussian curvature `K = κ1 κ2`, 1/m².
     pub gaussian: f64,
     /// Mean curvature `H = (κ1 + κ2)/2`, 1/m.
@@ -65,7 +65,7 @@ impl HeightJet {
 
     /// Gaussian, mean and principal curvatures with their directions.
     #[must_use]
-    pub fn curvature(&self) -> Curvature {
+    pub fn curvature(&self) -> PrincipalCurvatures {
         // In the G-orthonormal pair along the gradient and the contour, e1 = ĝ/√(1+|∇z|²) and e2 ⊥ ĝ, the
         // pencil B w = κ G w becomes an ordinary symmetric eigenproblem [a b; b c].
         let uphill = self.gradient().normalize_or(DVec2::X);
@@ -81,7 +81,7 @@ impl HeightJet {
         let axis =
             if half >= 0.0 { DVec2::new(half + radius, b) } else { DVec2::new(b, radius - half) };
         let axis = axis.normalize_or(DVec2::X);
-        Curvature {
+        PrincipalCurvatures {
             gaussian: a * c - b * b,
             mean,
             principal: [mean + radius, mean - radius],
@@ -145,7 +145,8 @@ mod tests {
 
     /// `w_iᵀGw_j = δ_ij` and `κ_i` is the normal curvature along `w_i`.
     fn check_directions(jet: &HeightJet, tolerance: f64) {
-        let Curvature { gaussian, mean, principal, directions: [w1, w2] } = jet.curvature();
+        let PrincipalCurvatures { gaussian, mean, principal, directions: [w1, w2] } =
+            jet.curvature();
         assert!((g_product(jet, w1, w1) - 1.0).abs() < 1e-12);
         assert!((g_product(jet, w2, w2) - 1.0).abs() < 1e-12);
         assert!(g_product(jet, w1, w2).abs() < 1e-12);

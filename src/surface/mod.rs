@@ -21,7 +21,7 @@ pub(crate) use self::block::{BLOCK, Lanes, SpaceLanes};
 pub use self::block::{Block, JetBlock};
 pub(crate) use self::bspline::block::HeightBlock;
 pub use self::bspline::residuals::Residuals;
-pub use self::curvature::Curvature;
+pub use self::curvature::PrincipalCurvatures;
 pub use self::height::{Degree, FitOptions, HeightSurface, Smoothing};
 pub(crate) use self::jet::Forms;
 pub use self::jet::{HeightJet, Jet, SurfaceJet};
