@@ -1,4 +1,4 @@
-//! The "how" of a long computation, apart from the "what": cancelling and progress.
+//! How a long computation runs: cancelling and progress.
 //!
 //! Threads are rayon's: work runs on the current rayon pool, so a caller chooses their number with
 //! [`rayon::ThreadPool::install`] or the global pool. No result depends on it, not in one bit.
@@ -19,14 +19,14 @@ impl CancelToken {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether somebody asked to stop.
+    /// Whether the work was asked to stop.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Called with the name of the stage and the share of it that is done, 0 to 1.
+/// Called with the name of the stage and the share of it that is done, 0 to 1; from any thread that works on it.
 pub type Progress = Arc<dyn Fn(&str, f64) + Send + Sync>;
 
 /// How to run: where to look for a request to cancel, where to report progress.
@@ -52,8 +52,10 @@ impl Control {
         Self { cancel: self.cancel.clone(), progress: None }
     }
 
+    /// Lets the work go on unless it was cancelled.
+    ///
     /// # Errors
-    /// [`Error::Cancelled`] once somebody cancelled.
+    /// [`Error::Cancelled`] if it was.
     pub fn check(&self) -> Result<()> {
         if self.cancel.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }

@@ -1,6 +1,6 @@
 //! Ridgeway plans routes over terrain by *anisotropic geodesic* distance.
 //!
-//! Ordinary geodesics only shorten. On the curvature metric a step is costly where the ground bends along it, so
+//! Ordinary geodesics minimise length alone. On the curvature metric a step is costly where the ground bends along it, so
 //! routes keep to valleys, ridges and hillsides, as mountain roads do. The method is that of Seong, Jeong and
 //! Cohen, *Anisotropic Geodesic Distance Computation for Parametric Surfaces* (SMI 2008).
 //!

@@ -23,7 +23,7 @@ pub use self::place::{Obstacle, PlaceError, PlaceErrorKind, Role};
 /// `Result` with the crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What can go wrong, by who can mend it.
+/// What can go wrong: in a file, in what the caller asked for, in the computation, on the machine.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -60,9 +60,9 @@ pub enum Error {
     NoPath {
         /// The goal.
         goal: Location,
-        /// What there is on this ground that closes places to every path.
+        /// The kinds of obstacle there are on this terrain; any of them may lie between.
         between: Vec<Obstacle>,
-        /// The place nearest to the goal that a path leads to, where somebody looked for it.
+        /// The place nearest to the goal that a path leads to; `None` if it was not searched for.
         nearest: Option<Location>,
     },
     /// The distance does not converge: the tensors of the metric are too extreme.
@@ -169,7 +169,7 @@ impl Error {
         self
     }
 
-    /// Lays the fault at the file that the argument came from: an [`Error::Argument`] becomes an [`Error::Format`];
+    /// Names the file that the argument came from: an [`Error::Argument`] becomes an [`Error::Format`];
     /// the others stay as they are.
     #[must_use]
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
@@ -181,7 +181,7 @@ impl Error {
         }
     }
 
-    /// The same for what the file may well say, but this crate does not read: an [`Error::Argument`] becomes an
+    /// Names the file where it is in order but holds what this crate does not read: an [`Error::Argument`] becomes an
     /// [`Error::Unsupported`]; the others stay as they are.
     #[must_use]
     pub fn unsupported_in(self, path: impl AsRef<Path>) -> Self {
@@ -228,7 +228,7 @@ fn size(bytes: u64) -> String {
     }
 }
 
-/// The cause in plain words where the system's are not.
+/// The cause in plain words where those of the system are not plain.
 fn cause(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => "there is no such file".into(),
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn no_path_tells_what_lies_between() {
+    fn no_path_names_the_obstacles_between() {
         let between = vec![Obstacle::Void, Obstacle::Barrier, Obstacle::Slope];
         let goal = Location::Map(DVec2::new(1.5, 2.0));
         let nearest = Some(Location::Node { col: 1, row: 2 });

@@ -41,7 +41,7 @@ pub enum PlaceErrorKind {
     Void,
     /// It lies on a barrier.
     Barrier,
-    /// The metric lets nobody enter because of these; if none, because it is too extreme there.
+    /// It is closed under the metric because of these; if none, because the metric is too extreme there.
     Closed(Vec<Obstacle>),
     /// It is a file with lines or areas where points are needed.
     NotPoints,
@@ -49,7 +49,7 @@ pub enum PlaceErrorKind {
     OffGround,
 }
 
-/// What closes places to every path.
+/// A kind of place that no path enters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Obstacle {

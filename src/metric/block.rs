@@ -25,7 +25,7 @@ impl SpeedBlock {
         self.set_with(j, i, (d, d.det()));
     }
 
-    /// The same with a determinant that is known better than from the entries.
+    /// The same with a determinant that is known more accurately than from the entries.
     #[inline(always)]
     pub(crate) fn set_with(&mut self, j: usize, i: usize, (d, det): (Sym2, f64)) {
         self.xx[j][i] = d.xx;

@@ -1,18 +1,19 @@
-//! The offset beside a curvature.
+//! The offset `δ` that is added to curvatures.
 
 use crate::error::{Error, Result};
 use crate::surface::{Measures, Surface};
 
-/// What bends by no more than this, as curvature times extent, is a plane. A plane of 4000² cells of 30 m with heights in `f32` is fitted,
+/// A surface that bends by no more than this, as curvature times extent, counts as a plane. A plane of 4000² cells of 30 m with heights in `f32` is fitted,
 /// by the defaults, with 5e-4 of rounding.
 pub(crate) const PLANE_BEND: f64 = 1e-3;
 
-/// The offset `δ` of the curvature tensor, 1/m: the cost of a flat direction beside a curved one.
+/// The offset `δ` of the curvature tensor, 1/m. A step along a principal direction costs `√(δ + |κ|)` per metre, so the smaller `δ`
+/// is, the cheaper are flat directions beside curved ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Delta {
     /// This share of the root-mean-square curvature of the surface. Scaling a terrain then scales `D` by a
-    /// constant and changes no route. On a plane `1/extent` instead, both from [`Surface::measures`]: any `δ` gives the same routes there. A plane
-    /// is what bends by less than 1e-3 over its extent: heights of four bytes make no better one.
+    /// constant and changes no route. On a plane `1/extent` instead, both from [`Surface::measures`]: any `δ` gives the same routes there.
+    /// A surface that bends by less than 1e-3 over its extent counts as a plane: heights in `f32` do not resolve less.
     Auto(f64),
     /// An absolute curvature in 1/m.
     Absolute(f64),

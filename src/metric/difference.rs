@@ -43,6 +43,7 @@ pub(super) const LITERAL: NamedMetric = NamedMetric {
     make: |options: &MetricOptions| Ok(Box::new(with(DifferenceForm::Literal, options))),
 };
 
+/// The metric of a form with options.
 fn with(form: DifferenceForm, options: &MetricOptions) -> Difference {
     let default = Difference::default();
     Difference {
@@ -63,7 +64,7 @@ pub struct Difference {
     /// plains become the costliest ground (`docs/mathematics.md` has a measurement).
     pub curvature_delta: Delta,
     /// `δ` beside `γ`. [`Delta::Auto`] is a share of the square of the mean of `√(γ1+γ2)` over the surface, but at least 1e-6
-    /// (times the mean area of a cell, if literal): changes by less than a thousandth of the way are rounding.
+    /// (times the mean area of a cell, if literal): rates `√γ` below 1e-3 are rounding.
     /// [`Delta::Absolute`] is in the unit of `γ`. Default: all of it. With less, speeds differ so much with the direction that
     /// the grid no longer resolves them.
     pub delta: Delta,
@@ -103,8 +104,8 @@ pub struct Change {
 }
 
 impl Difference {
-    /// How the curvature tensor changes around every node, row-major. 220 ns of one core per node with what [`norm`](Metric::norm)
-    /// makes of it, and 32 bytes.
+    /// How the curvature tensor changes around every node, row-major. Takes 220 ns of one core per node, together with what
+    /// [`norm`](Metric::norm) makes of it, and 32 bytes per node.
     ///
     /// # Errors
     /// A `δ` of the curvature tensor out of range; cancelled.
@@ -256,7 +257,7 @@ struct Node {
     first: [DVec3; 2],
     form: Sym2,
     tensor: DMat3,
-    /// Whether neighbours may look at it.
+    /// Whether neighbours are compared with it.
     counts: bool,
 }
 
@@ -280,36 +281,37 @@ impl Node {
     }
 
     /// CT transported to a neighbour, along with the tangent plane.
-    fn seen_from(&self, other: &Self) -> DMat3 {
-        let turn = DMat3::from_quat(DQuat::from_rotation_arc(self.normal(), other.normal()));
-        turn * self.tensor * turn.transpose()
+    fn transported_to(&self, other: &Self) -> DMat3 {
+        let rotation = DMat3::from_quat(DQuat::from_rotation_arc(self.normal(), other.normal()));
+        rotation * self.tensor * rotation.transpose()
     }
 }
 
 /// A node and its neighbours `u_1^+, u_1^-, u_2^+, u_2^-`, as far as they are there.
-struct Around<'a> {
+struct Neighbourhood<'a> {
     here: &'a Node,
-    beside: [Option<&'a Node>; 4],
+    neighbours: [Option<&'a Node>; 4],
 }
 
-impl Around<'_> {
+impl Neighbourhood<'_> {
     /// `l` to neighbour `k`, m; NaN if there is none.
     fn difference(&self, k: usize) -> f64 {
-        self.beside[k].map_or(f64::NAN, |there| norm(there.tensor - self.here.tensor))
+        self.neighbours[k].map_or(f64::NAN, |there| norm(there.tensor - self.here.tensor))
     }
 
     /// A derivative in space whose tangential part is `∇C` along `u_j`: central, one-sided where a neighbour is missing, 0 where both
     /// are. A chord to one side has a part of first order in the tangent plane only because that turns: it is turned back.
     fn derivative(&self, j: usize) -> DMat3 {
         let here = self.here;
-        match (self.beside[2 * j], self.beside[2 * j + 1]) {
+        match (self.neighbours[2 * j], self.neighbours[2 * j + 1]) {
             (Some(after), Some(before)) => (after.tensor - before.tensor) * 0.5,
-            (Some(after), None) => after.seen_from(here) - here.tensor,
-            (None, Some(before)) => here.tensor - before.seen_from(here),
+            (Some(after), None) => after.transported_to(here) - here.tensor,
+            (None, Some(before)) => here.tensor - before.transported_to(here),
             (None, None) => DMat3::ZERO,
         }
     }
 
+    /// `Γ` of [`DifferenceForm::Rate`].
     fn rates(&self) -> Sym2 {
         let [s1, s2] = self.here.first;
         let [e1, e2] = Frame::of(self.here.form).vectors();
@@ -321,15 +323,16 @@ impl Around<'_> {
         Sym2::new(dot(along1, along1), dot(along1, along2), dot(along2, along2))
     }
 
+    /// `Γ` of [`DifferenceForm::Literal`].
     fn literal(&self) -> Sym2 {
         let Frame { b, c, .. } = Frame::of(self.here.form);
         let tangents = [DVec2::X, DVec2::new(b, c).normalize()];
-        let squares = |j: usize| {
-            let sides = [2 * j, 2 * j + 1].map(|k| self.difference(k).powi(2));
-            let known = sides.iter().filter(|square| !square.is_nan());
+        let doubled_mean = |j: usize| {
+            let squares = [2 * j, 2 * j + 1].map(|k| self.difference(k).powi(2));
+            let known = squares.iter().filter(|square| !square.is_nan());
             2.0 * known.clone().sum::<f64>() / known.count().max(1) as f64
         };
-        Sym2::outer(tangents[0]) * squares(0) + Sym2::outer(tangents[1]) * squares(1)
+        Sym2::outer(tangents[0]) * doubled_mean(0) + Sym2::outer(tangents[1]) * doubled_mean(1)
     }
 }
 
@@ -338,7 +341,7 @@ fn norm(a: DMat3) -> f64 {
     (a.x_axis.length_squared() + a.y_axis.length_squared() + a.z_axis.length_squared()).sqrt()
 }
 
-/// What progress calls it.
+/// Name of the stage in progress reports.
 const STAGE: &str = "comparing curvature";
 
 /// Rows that one thread takes in turn: two more are evaluated for each band.
@@ -349,7 +352,7 @@ fn at_nodes<T: Clone + Default + Send>(
     surface: &dyn Surface,
     delta: f64,
     control: &Control,
-    value: impl Fn(&Around<'_>) -> T + Sync,
+    value: impl Fn(&Neighbourhood<'_>) -> T + Sync,
 ) -> Result<Vec<T>> {
     let (cols, rows) = (surface.cols(), surface.rows());
     let [across, down] = surface.periodic();
@@ -362,19 +365,19 @@ fn at_nodes<T: Clone + Default + Send>(
     let (bands, done) = (rows.div_ceil(BAND), AtomicUsize::new(0));
     values.par_chunks_mut(cols.max(1) * BAND).enumerate().for_each(|(band, values)| {
         let first = band * BAND;
-        let mut before = beside(first, rows, down)[1].map(load);
+        let mut before = neighbours(first, rows, down)[1].map(load);
         let mut here = load(first);
         for (row, values) in (first..).zip(values.chunks_mut(cols)) {
             if control.cancel.is_cancelled() {
                 return;
             }
-            let after = beside(row, rows, down)[0].map(load);
+            let after = neighbours(row, rows, down)[0].map(load);
             for (col, out) in values.iter_mut().enumerate() {
-                let [east, west] = beside(col, cols, across).map(|col| Some(&here[col?]));
+                let [east, west] = neighbours(col, cols, across).map(|col| Some(&here[col?]));
                 let [south, north] = [&after, &before].map(|row| row.as_ref().map(|row| &row[col]));
-                let beside = [east, west, south, north];
-                let beside = beside.map(|node| node.filter(|node| node.counts));
-                *out = value(&Around { here: &here[col], beside });
+                let neighbours = [east, west, south, north];
+                let neighbours = neighbours.map(|node| node.filter(|node| node.counts));
+                *out = value(&Neighbourhood { here: &here[col], neighbours });
             }
             before = Some(mem::replace(&mut here, after.unwrap_or_default()));
         }
@@ -386,8 +389,8 @@ fn at_nodes<T: Clone + Default + Send>(
     Ok(values)
 }
 
-/// The places after and before `i` among `count`.
-fn beside(i: usize, count: usize, periodic: bool) -> [Option<usize>; 2] {
+/// The indices after and before `i` among `count`.
+fn neighbours(i: usize, count: usize, periodic: bool) -> [Option<usize>; 2] {
     let after = if i + 1 < count { Some(i + 1) } else { periodic.then_some(0) };
     let before = if i > 0 { Some(i - 1) } else { periodic.then_some(count - 1) };
     [after, before]

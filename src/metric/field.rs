@@ -5,7 +5,7 @@ use std::mem;
 
 use glam::DVec2;
 
-use super::modifiers::{Bound, Modifiers};
+use super::modifiers::{BoundModifiers, Modifiers};
 use super::{Metric, Norm, Parameter, SpeedBlock, SpeedTensor, Unit};
 use crate::control::Control;
 use crate::error::{Error, Obstacle, Result};
@@ -19,7 +19,7 @@ pub struct MetricField<'a> {
     name: String,
     unit: Unit,
     norm: Norm,
-    modifiers: Bound,
+    modifiers: BoundModifiers,
 }
 
 impl<'a> MetricField<'a> {
@@ -53,7 +53,7 @@ impl<'a> MetricField<'a> {
         self.unit
     }
 
-    /// The numbers that say which metric it is, beside its name.
+    /// The numbers that the metric depends on, for the record.
     #[must_use]
     pub fn parameters(&self) -> &[Parameter] {
         self.norm.parameters()
@@ -66,7 +66,7 @@ impl<'a> MetricField<'a> {
         parameter.map(|parameter| parameter.value)
     }
 
-    /// See [`Norm::with_level`].
+    /// Square of the cost per metre of level ground of constant shape, if it is known, see [`Norm::with_level`].
     #[must_use]
     pub fn level(&self) -> Option<f64> {
         self.norm.level()
@@ -130,8 +130,10 @@ impl<'a> MetricField<'a> {
         speed.inverse().rescale(self.surface.axes(at.y))
     }
 
+    /// Refuses a metric without a quadratic form.
+    ///
     /// # Errors
-    /// The metric has no quadratic form.
+    /// It has none.
     pub(crate) fn check_quadratic(&self) -> Result<()> {
         match self.norm.tensor() {
             Some(_) => Ok(()),

@@ -1,4 +1,4 @@
-//! Who travels, and how costly a step is in each direction.
+//! Metrics: how costly a step is at each place in each direction.
 //!
 //! A metric says what a small step `v` around a place `x` costs: `F(x, v) ≥ 0`, twice as much for a step twice as long, but not
 //! always the same there and back. Most are *quadratic*: they have at every point a symmetric positive definite *speed tensor*
@@ -16,10 +16,10 @@
 //! away from changing slopes and follow valleys, ridges and hillsides. On the difference metric a step is costly where the
 //! curvature changes along it, so distances are short within a part of even shape and long from one part to the next.
 //!
-//! # A metric of one's own
+//! # Your own metric
 //!
-//! is a type that implements [`Metric`]: its name, its unit, and on a surface its [`Norm`], most simply from a function that
-//! gives `D`. Here ground that faces north is twice as slow:
+//! A metric is a type that implements [`Metric`]: its name, its unit, and on a surface its [`Norm`], most simply from a function
+//! that gives `D`. Here ground that faces north is twice as slow:
 //!
 //! ```
 //! use ridgeway::metric::{Metric, Norm, Unit};
@@ -57,10 +57,10 @@
 //! # }
 //! ```
 //!
-//! # Where a metric of this crate goes
+//! # Adding a metric to this crate
 //!
-//! Into a file of its own beside `isotropic.rs`, with its [`NamedMetric`], and that into [`NAMED`]; the command and its help go by that
-//! list.
+//! It is a file of its own beside `isotropic.rs` that holds its [`NamedMetric`], and an entry in [`NAMED`], from which the command
+//! and its help are made.
 
 mod block;
 mod curvature;
@@ -95,7 +95,7 @@ use crate::error::Result;
 use crate::linalg::Sym2;
 use crate::surface::Surface;
 
-/// A way of measuring distance, as it is asked for: not yet on a surface.
+/// A metric and its parameters, not yet bound to a surface.
 pub trait Metric: fmt::Debug + Send + Sync {
     /// Its name, for tables and files.
     fn name(&self) -> &str;
@@ -103,7 +103,7 @@ pub trait Metric: fmt::Debug + Send + Sync {
     /// Unit of its distances.
     fn unit(&self) -> Unit;
 
-    /// What it is on a surface: parameters that depend on the surface are settled, and what is known at the nodes only is
+    /// Its norm on a surface: parameters that depend on the surface are determined, and what is known at the nodes only is
     /// computed.
     ///
     /// # Errors
@@ -165,16 +165,16 @@ pub struct MetricOptions {
 }
 
 impl NamedMetric {
-    /// The one of this name.
+    /// The metric of this name; `None` if there is none.
     #[must_use]
     pub fn find(name: &str) -> Option<Self> {
         NAMED.into_iter().find(|metric| metric.name == name)
     }
 
-    /// The metric with options.
+    /// The metric with these options.
     ///
     /// # Errors
-    /// It lacks something: tensors.
+    /// [`Error::Argument`](crate::Error::Argument) if it needs tensors and the options have none.
     pub fn with(&self, options: &MetricOptions) -> Result<Box<dyn Metric>> {
         (self.make)(options)
     }

@@ -1,4 +1,4 @@
-//! What composes with every metric on every surface.
+//! Modifiers of a metric: climb weight, slope limit, barriers and costs. They compose with every metric on every surface.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::linalg::Sym2;
 use crate::linalg::simd::{self, Kernel};
 use crate::surface::{BLOCK, Block, HeightBlock, Jet, JetBlock, Surface};
 
-/// What composes with every metric.
+/// What modifies a metric, any of them on any surface.
 #[derive(Clone, Debug, Default)]
 pub struct Modifiers {
     /// `β ≥ 0`: adds `β (dz)²` to the square of what a step costs, an aversion to grade: the metric `M` becomes
@@ -32,7 +32,7 @@ pub struct Modifiers {
 
 /// The modifiers on a surface.
 #[derive(Clone, Debug)]
-pub(super) struct Bound {
+pub(super) struct BoundModifiers {
     nodes: Nodes,
     climb_weight: f64,
     cost: Option<Arc<[f32]>>,
@@ -42,10 +42,12 @@ pub(super) struct Bound {
 }
 
 impl Modifiers {
+    /// The modifiers bound to a surface.
+    ///
     /// # Errors
     /// A climb weight or slope out of range; a raster whose size is not the surface's; a cost that is finite but not positive,
     /// or costs too far apart.
-    pub(super) fn on(&self, surface: &dyn Surface) -> Result<Bound> {
+    pub(super) fn on(&self, surface: &dyn Surface) -> Result<BoundModifiers> {
         let climb_weight = self.climb_weight;
         if !(climb_weight.is_finite() && climb_weight >= 0.0) {
             return Err(Error::argument("the climb weight", climb_weight, "0 or more"));
@@ -53,7 +55,7 @@ impl Modifiers {
         if let Some(cost) = &self.cost {
             check_costs(surface, cost)?;
         }
-        Ok(Bound {
+        Ok(BoundModifiers {
             nodes: Nodes::of(surface),
             climb_weight,
             cost: self.cost.clone(),
@@ -135,13 +137,13 @@ fn close_steep(surface: &dyn Surface, row: usize, steepest: f64, open: &mut [boo
     }
 }
 
-impl Bound {
+impl BoundModifiers {
     /// The unit of distances in `unit` once the modifiers weigh them.
     pub(super) fn unit(&self, unit: Unit) -> Unit {
         if self.climb_weight == 0.0 && self.cost.is_none() { unit } else { unit.weighted() }
     }
 
-    /// What may close nodes, but voids.
+    /// What may close nodes, other than voids.
     pub(super) fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
     }

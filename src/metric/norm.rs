@@ -9,7 +9,7 @@ use super::SpeedBlock;
 use crate::linalg::Sym2;
 use crate::surface::{Block, Jet, JetBlock};
 
-/// What a step costs on a surface: the function `F`, and the numbers that say which.
+/// What a step costs on a surface: the function `F`, and for the record the parameters it was made with.
 #[derive(Clone)]
 pub struct Norm {
     form: Form,
@@ -60,7 +60,7 @@ impl Norm {
         self
     }
 
-    /// The same, known to cost `√level` per metre of level ground of even shape: what a [climb weight](super::Modifiers::climb_weight) is
+    /// The same, known to cost `√level` per metre of level ground of constant shape: what a [climb weight](super::Modifiers::climb_weight) is
     /// weighed against.
     #[must_use]
     pub fn with_level(mut self, level: f64) -> Self {
@@ -125,17 +125,17 @@ impl fmt::Debug for Norm {
 
 /// The speed tensor `D` of a quadratic norm. A function of place and jet is one.
 pub trait SpeedTensor: Send + Sync {
-    /// `D` at grid coordinates `at`, where the surface has this jet, in the axes of the surface. Nobody enters where it is not
+    /// `D` at grid coordinates `at`, where the surface has this jet, in the axes of the surface. A place is closed where it is not
     /// positive definite.
     fn speed(&self, at: DVec2, jet: &Jet) -> Sym2;
 
-    /// The same with its determinant, for those that know it better than from the entries.
+    /// The same with its determinant. To be overridden where that is known more accurately than from the entries.
     fn speed_and_det(&self, at: DVec2, jet: &Jet) -> (Sym2, f64) {
         let d = self.speed(at, jet);
         (d, d.det())
     }
 
-    /// `D` at the nodes of a block, where the surface has these jets. For those that do many faster than one by one.
+    /// `D` at the nodes of a block, where the surface has these jets. To be overridden where many together are faster than one by one.
     fn block(&self, block: &Block, jets: &JetBlock, speeds: &mut SpeedBlock) {
         one_by_one(self, block, jets, speeds);
     }
