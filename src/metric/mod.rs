@@ -40,8 +40,8 @@
 //!     }
 //!
 //!     fn norm(&self, _: &dyn Surface, _: &Control) -> Result<Norm> {
-//!         let speed = |jet: &Jet| if jet.gradient().y < 0.0 { 0.5 } else { 1.0 };
-//!         let tensor = move |_: DVec2, jet: &Jet| jet.first_form().inverse() * speed(jet).powi(2);
+//!         let squared_speed = |jet: &Jet| if jet.gradient().y < 0.0 { 0.25 } else { 1.0 };
+//!         let tensor = move |_: DVec2, jet: &Jet| jet.first_form().inverse() * squared_speed(jet);
 //!         Ok(Norm::quadratic(tensor))
 //!     }
 //! }
