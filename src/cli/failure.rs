@@ -27,12 +27,12 @@ impl Failure {
         Self { message: message.into(), code: WRONG_USE }
     }
 
-    /// Words an error on the path to the goals of a scenario, which are named as the user wrote them.
-    pub(crate) fn between(scenario: &Scenario) -> impl Fn(Error) -> Self {
-        |error| Self::on_the_path(error, scenario)
+    /// Turns errors into failures that name the goal that cannot be reached as the user wrote it.
+    pub(crate) fn naming_goals(scenario: &Scenario) -> impl Fn(Error) -> Self {
+        |error| Self::naming_goal(error, scenario)
     }
 
-    fn on_the_path(error: Error, scenario: &Scenario) -> Self {
+    fn naming_goal(error: Error, scenario: &Scenario) -> Self {
         let Error::NoPath { goal: Location::Grid(at), nearest, .. } = error else {
             return error.into();
         };

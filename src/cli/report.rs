@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::args::RunArgs;
 use crate::failure::Result;
 
-/// The outcome of a command, for people and for machines.
+/// The result of a command, for people and for machines.
 pub(crate) struct Report {
     text: String,
     json: String,

@@ -70,16 +70,22 @@ pub fn write_file(
     check_free(path, overwrite)?;
     // A link is followed, so that its target is replaced and not the link.
     let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let put = || -> io::Result<()> {
-        let mut out = BufWriter::new(temporary_file(parent(&place))?);
-        write(&mut out)?;
-        out.flush()?;
-        let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-        if overwrite { file.persist(&place) } else { file.persist_noclobber(&place) }
-            .map(drop)
-            .map_err(|e| e.error)
-    };
-    put().map_err(|e| Error::io(path, e))
+    write_and_rename(&place, overwrite, write).map_err(|e| Error::io(path, e))
+}
+
+/// Writes a temporary file beside `place` and renames it.
+fn write_and_rename(
+    place: &Path,
+    overwrite: bool,
+    write: impl FnOnce(&mut Output) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(temporary_file(parent(place))?);
+    write(&mut out)?;
+    out.flush()?;
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    if overwrite { file.persist(place) } else { file.persist_noclobber(place) }
+        .map(drop)
+        .map_err(|e| e.error)
 }
 
 /// Fills the folder `path` by `fill`, which is given an empty temporary folder: beside it, and renamed into

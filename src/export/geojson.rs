@@ -14,7 +14,7 @@ use crate::route::Route;
 use crate::terrain::Crs;
 
 /// A feature per `(name, route)` whose properties are `name` and all of the route's summary.
-/// `provenance` becomes the collection's member of that name: what is needed to make the run again.
+/// `provenance` becomes the collection's member of that name: what is needed to repeat the run.
 ///
 /// Without a CRS the positions are map coordinates, and the member `coordinate_note` says so.
 ///
@@ -29,7 +29,8 @@ pub fn routes_geojson(
     collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
-/// A feature per level that has lines, with the properties `distance` and `unit`; `frame` places the lines.
+/// A feature per level that has lines, with the properties `distance` and `unit`. Lines are in the grid coordinates of `frame`, whose map
+/// lies in `crs`.
 ///
 /// # Errors
 /// As [`routes_geojson`].
@@ -45,7 +46,7 @@ pub fn isolines_geojson(
     collection(features, |map| crs.to_lonlat(map), provenance)
 }
 
-/// A feature per region, given by its properties and its polygons; `frame` places them. Rings run as RFC 7946 wants them;
+/// A feature per region, given by its properties and its polygons in the grid coordinates of `frame`, whose map lies in `crs`. Rings run as RFC 7946 wants them;
 /// one that crosses 180° goes on beyond it.
 ///
 /// # Errors

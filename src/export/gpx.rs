@@ -11,7 +11,7 @@ use crate::terrain::Crs;
 /// A GPX document with one track per `(name, route)`, heights in metres.
 ///
 /// # Errors
-/// [`Error::Argument`] if `crs` has no way to longitude and latitude, which GPX needs.
+/// [`Error::Argument`] if points in `crs` cannot be brought to longitude and latitude, which GPX needs.
 pub fn routes_gpx(routes: &[(impl AsRef<str>, &Route)], crs: &Crs) -> Result<String> {
     document(routes, |map| crs.to_lonlat(map))
 }

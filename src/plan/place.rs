@@ -129,7 +129,7 @@ impl Notation {
         }
     }
 
-    /// Grid coordinates as people would write them, to about a hundredth of a cell.
+    /// Grid coordinates written in this notation, to about a hundredth of a cell.
     ///
     /// # Errors
     /// Longitude and latitude without a CRS, or that cannot be projected.
@@ -154,7 +154,7 @@ fn pair(text: &str) -> Option<DVec2> {
     Some(DVec2::new(number(x)?, number(y)?))
 }
 
-/// A coordinate, rounded to about a hundredth of a cell.
+/// A coordinate as text, rounded to about a hundredth of a cell; `cell` is the cell's size in the unit of the coordinate.
 #[must_use]
 pub fn coordinate(value: f64, cell: f64) -> String {
     let decimals = (2.0 - cell.log10()).ceil().clamp(0.0, 12.0) as usize;

@@ -29,9 +29,9 @@ pub struct Provenance {
     pub surface: String,
     /// Cut-off wavelength of the surface in metres, if it has one.
     pub cutoff_m: Option<f64>,
-    /// Aversion to grade.
+    /// Aversion to grade `β`, see [`Modifiers::climb_weight`](crate::Modifiers::climb_weight).
     pub climb_weight: f64,
-    /// The steepest ground that may be entered.
+    /// The steepest ground that may be entered, degrees.
     pub max_slope_deg: Option<f64>,
     /// The files of barriers.
     pub barriers: Vec<String>,

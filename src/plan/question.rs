@@ -17,7 +17,7 @@ pub struct Question {
     pub goals: Vec<Place>,
     /// What surface to fit to the DEM.
     pub fit: FitOptions,
-    /// How to solve.
+    /// How the distance is solved.
     pub solver: Solver,
     /// Aversion to grade, see [`Modifiers::climb_weight`](crate::Modifiers::climb_weight).
     pub climb_weight: f64,

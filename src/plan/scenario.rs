@@ -145,8 +145,8 @@ impl Scenario {
         no_value.into_iter().chain(is_steep.then_some(Obstacle::Slope)).collect()
     }
 
-    /// What level ground costs on the metric, if the climb weight is so much more that the grid cannot follow the metric, and
-    /// distances come out far too short.
+    /// What level ground costs on the metric ([`MetricField::level`]), if the climb weight is more than 1000 times as much: the grid then cannot
+    /// follow the metric, and distances come out far too short. Else `None`.
     #[must_use]
     pub fn outweighed_level(&self, field: &MetricField<'_>) -> Option<f64> {
         /// A grade of 60 % is then 19 times as costly as level ground. Across Andorra (75 m cells) the distance is 9 % too short at 1800,
@@ -216,7 +216,7 @@ impl Scenario {
             .or_else(|error| self.explain(error, fields, control))
     }
 
-    /// For no path, on which metric the distance ends before the goal, and where; else the error.
+    /// Of an error for want of a path, the one that says on which metric and where the distance ends before the goal; else the error itself.
     fn explain<T>(&self, error: Error, fields: &[MetricField<'_>], control: &Control) -> Result<T> {
         if let Error::NoPath { .. } = error {
             for field in fields {

@@ -25,22 +25,22 @@ pub fn gaussian_ranks(surface: &dyn Surface) -> Vec<f64> {
 
 impl MetricField<'_> {
     /// What the nodes are ranked by as seeds, row-major: what the metric itself says
-    /// ([`Norm::with_seed_ranks`](crate::metric::Norm::with_seed_ranks): `γ1 γ2` on the difference metric), else [`gaussian_ranks`].
+    /// ([`Norm::with_seed_ranks`](crate::metric::Norm::with_seed_ranks): `γ1 γ2` on the difference metric), else [`gaussian_ranks`] of its surface. Cost: a copy, or that of [`gaussian_ranks`].
     #[must_use]
     pub fn seed_ranks(&self) -> Vec<f64> {
         self.own_seed_ranks().map_or_else(|| gaussian_ranks(self.surface()), <[f64]>::to_vec)
     }
 }
 
-/// The cluster `D_ε(p)`: the open nodes within `epsilon` (unit of the metric) of a node, as places in the row-major grid, each with its
-/// distance. Empty if the node is closed.
+/// The cluster `D_ε(p)`: the open nodes within `epsilon` (unit of the metric) of the seed, given by its column and row. Each comes as its
+/// index in the row-major grid with its distance; none if the seed is closed.
 ///
 /// # Cost
 /// That of the tiles of 16 × 16 nodes that hold the cluster; what lies beyond those beside them is not looked at. Besides, 4 bytes per node of
 /// the grid are set aside, which takes at most 0.2 ms per million nodes.
 ///
 /// # Errors
-/// [`Error::Argument`] if the seed is not on the grid or `epsilon` is no number, 0 or more; [`Error::Cancelled`].
+/// [`Error::Argument`] if the seed is not on the grid or `epsilon` is negative or not a number; [`Error::Cancelled`].
 pub fn cluster(
     field: &TensorField,
     seed: [usize; 2],
@@ -57,7 +57,7 @@ pub fn cluster(
 /// Clusters that together hold all open nodes.
 #[derive(Debug)]
 pub(super) struct SeedCover {
-    /// Their seeds, as places in the row-major grid.
+    /// Their seeds, as indices in the row-major grid.
     pub(super) seeds: Vec<usize>,
     /// Their radius, in the unit of the metric.
     pub(super) epsilon: f64,
@@ -82,7 +82,7 @@ pub(super) fn seed_cover(
     let mut seeds = Vec::new();
     let quiet = control.quiet();
     let mut balls = Balls::new(field);
-    let coordinates = |place: usize| [place % cols, place / cols];
+    let coordinates = |index: usize| [index % cols, index / cols];
     let epsilon = match (epsilon, order.first()) {
         (Some(epsilon), _) => epsilon,
         (None, Some(&(_, first))) => {
@@ -102,7 +102,7 @@ pub(super) fn seed_cover(
         }
         control.report("covering", done as f64 / order.len() as f64);
         let held = balls.around(coordinates(seed), epsilon, &quiet)?;
-        held.for_each(|(place, _)| is_held[place] = true);
+        held.for_each(|(index, _)| is_held[index] = true);
         seeds.push(seed);
     }
     Ok(SeedCover { seeds, epsilon })
@@ -130,9 +130,9 @@ fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
     .advise(advice)
 }
 
-/// Grid coordinates of a place in the row-major grid.
-pub(super) fn node(place: usize, cols: usize) -> DVec2 {
-    DVec2::new((place % cols) as f64, (place / cols) as f64)
+/// Grid coordinates of a node, given by its index in the row-major grid.
+pub(super) fn node(index: usize, cols: usize) -> DVec2 {
+    DVec2::new((index % cols) as f64, (index / cols) as f64)
 }
 
 #[cfg(test)]

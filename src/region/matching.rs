@@ -88,7 +88,7 @@ fn greedy(
     Ok(found)
 }
 
-/// What became of a region so far.
+/// What has become of a region so far.
 #[derive(Clone, Copy, Default)]
 struct Region {
     /// It was in a pair.

@@ -4,15 +4,14 @@ use std::ops::Range;
 
 use super::clusters::{node, seed_cover};
 use crate::control::Control;
-use crate::eikonal::TensorField;
-use crate::eikonal::{Solver, StartRegion, Stop};
+use crate::eikonal::{Solver, StartRegion, Stop, TensorField};
 use crate::error::{Error, Result};
 
 /// Steps to the neighbours of a node, as (columns, rows).
 const RING: [(isize, isize); 8] =
     [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// How to cut.
+/// How to cut a surface into regions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SegmentOptions {
     /// How often to cut: 1 for the surface once, 2 for its regions again, ... Default 1.
@@ -58,7 +57,7 @@ impl SegmentOptions {
 pub struct Region {
     /// Column and row of the seed.
     pub seed: [usize; 2],
-    /// The region of the level above, as a place in [`Level::regions`]; `None` on the first level.
+    /// The region of the level above, as an index into its [`Level::regions`]; `None` on the first level.
     pub parent: Option<u32>,
     /// Radius of the clusters that its parent was covered with, in the unit of the metric.
     pub epsilon: f64,
@@ -67,7 +66,7 @@ pub struct Region {
 /// The regions of one level: together they hold all open nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Level {
-    /// Region of each node, row-major, as a place in `regions`; `None` where closed.
+    /// Region of each node, row-major, as an index into `regions`; `None` where closed.
     pub labels: Vec<Option<u32>>,
     /// By parent, then in the order in which their seeds were found.
     pub regions: Vec<Region>,
@@ -208,7 +207,7 @@ fn fill(labels: &mut [Option<u32>], inside: &[bool], cols: usize) {
     }
 }
 
-/// The columns and rows that hold all the places, in ascending order, of a row-major grid with `cols` columns.
+/// The columns and rows that hold all the places (indices of nodes, ascending) of a row-major grid with `cols` columns.
 fn spans(places: &[usize], cols: usize) -> [Range<usize>; 2] {
     let [Some(&first), Some(&last)] = [places.first(), places.last()] else { return [0..0, 0..0] };
     let widen = |span: Range<usize>, &place: &usize| {
@@ -312,7 +311,7 @@ mod tests {
             let solver = Solver::default();
             solver.solve_field(field.clone(), starts, &Stop::Never, &Control::default()).unwrap()
         };
-        // With other cones taken out, values differ by their errors of first order.
+        // With other factors taken out, values differ by their errors of first order.
         let farthest = distance(&starts).to_row_major().into_iter().fold(0f32, f32::max);
         assert!(f64::from(farthest) < 1.05 * radius, "{farthest}");
         // No seed is in the cluster of an earlier one.

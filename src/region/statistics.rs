@@ -64,7 +64,8 @@ impl RegionStatistics {
     }
 }
 
-/// Measures of the regions of a level, in the order of [`Level::regions`]. Cost: one evaluation of the surface per node.
+/// Measures of the regions of a level, in the order of [`Level::regions`]; the level must be one of this surface. Cost: one evaluation of
+/// the surface per node.
 #[must_use]
 pub fn statistics(surface: &dyn Surface, level: &Level) -> Vec<RegionStatistics> {
     /// Rows that are evaluated at a time; they are added up one after the other, so that the sums do not depend on the threads.

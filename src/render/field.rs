@@ -14,6 +14,7 @@ use crate::grid::{GridFrame, round_step};
 
 /// Colours along the bar.
 const SHADES: usize = 256;
+
 /// What a picture of a field shows.
 #[derive(Clone, Debug)]
 pub struct FieldPicture<'a> {
@@ -29,7 +30,7 @@ pub struct FieldPicture<'a> {
     pub title: String,
     /// Pixels of the map's longer side. Default: 1600.
     pub max_side_px: u32,
-    /// How to run: asked for cancelling while the ground is painted.
+    /// Asked whether to cancel while the ground is painted.
     pub control: Control,
 }
 

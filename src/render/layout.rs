@@ -107,7 +107,7 @@ impl MapLayout {
     }
 
     /// Pixel coordinates of grid coordinates.
-    pub(super) fn place(&self, grid: DVec2) -> Vec2 {
+    pub(super) fn to_pixels(&self, grid: DVec2) -> Vec2 {
         let corner = DVec2::new(self.map[0] as f64, self.map[1] as f64);
         (corner + (grid + 0.5) / self.cells).as_vec2()
     }
@@ -121,12 +121,12 @@ impl MapLayout {
 
     /// Polylines of grid coordinates in pixels.
     pub(super) fn lines(&self, lines: &[Vec<DVec2>]) -> Vec<Vec<Vec2>> {
-        lines.iter().map(|line| line.iter().map(|&p| self.place(p)).collect()).collect()
+        lines.iter().map(|line| line.iter().map(|&p| self.to_pixels(p)).collect()).collect()
     }
 
     /// A pin at grid coordinates that bears a letter or a number.
     pub(super) fn pin(&mut self, grid: DVec2, mark: &str, colour: Rgb) {
-        let at = self.place(grid);
+        let at = self.to_pixels(grid);
         draw_pin(&mut self.canvas, at, mark, colour, self.unit);
     }
 

@@ -52,7 +52,7 @@ pub struct MapPicture<'a> {
     pub title: String,
     /// Pixels of the map's longer side. Default: 1600.
     pub max_side_px: u32,
-    /// How to run: asked for cancelling while the ground is painted.
+    /// Asked whether to cancel while the ground is painted.
     pub control: Control,
 }
 
@@ -99,7 +99,7 @@ impl<'a> MapPicture<'a> {
             labels.extend(draw_isolines(&mut layout, layer));
         }
         let on_top = self.routes.iter().flat_map(|r| r.grid).chain(&self.starts).chain(&self.goals);
-        let taken: Vec<_> = on_top.map(|&p| layout.place(p)).collect();
+        let taken: Vec<_> = on_top.map(|&p| layout.to_pixels(p)).collect();
         draw_labels(&mut layout, labels, &taken);
         self.draw_routes(&mut layout);
         self.starts.iter().for_each(|&at| layout.pin(at, "S", Rgb::GREEN));
@@ -230,7 +230,7 @@ mod tests {
         let picture = map.render().unwrap();
         let layout = MapLayout::new(&frame, "", 1600, []).unwrap();
         let pixel = |grid: DVec2, off: f32| {
-            let at = layout.place(grid);
+            let at = layout.to_pixels(grid);
             let [r, g, b, _] = picture.get_pixel(at.x as u32, (at.y + off) as u32).0;
             Rgb(r, g, b)
         };
@@ -241,7 +241,7 @@ mod tests {
         assert_eq!(pixel(DVec2::new(80.0, 10.0), 0.0), ground.mix(BARRIER, 0.5));
         // Twice as wide as tall, as on the ground.
         assert_eq!(
-            layout.place(DVec2::new(99.5, 49.5)) - layout.place(DVec2::splat(-0.5)),
+            layout.to_pixels(DVec2::new(99.5, 49.5)) - layout.to_pixels(DVec2::splat(-0.5)),
             Vec2::new(1600.0, 800.0)
         );
     }

@@ -9,21 +9,21 @@ use super::text;
 /// No number is smaller than this in any picture, pixels.
 const LEGIBLE: f32 = 10.0;
 
-/// Writes the number of each region, counted from 1, into the middle of its roomiest place, where it has one. `pixels` are the regions of a
-/// part of the canvas of so many columns, `left` and `top` its corner; sizes are between `largest` and half of it.
+/// Writes the number of each region, counted from 1, into the middle of the largest square within it, if that is large enough. `pixels`
+/// are the regions of a part of the canvas of so many columns, `left` and `top` its corner; sizes are between `largest` and half of it.
 pub(super) fn draw_numbers(
     canvas: &mut Canvas,
     pixels: &[Option<u32>],
     [left, top, width]: [usize; 3],
     largest: f32,
 ) {
-    for (region, room) in rooms(pixels, width).into_iter().enumerate() {
+    for (region, square) in largest_squares(pixels, width).into_iter().enumerate() {
         let number = (region + 1).to_string();
         // Half of the text per pixel of its size; half of DejaVu's capital height, 0.729 em, centres it.
         let half = Vec2::new(0.5 * text::width(&number, 1.0), 0.365);
-        let size = largest.min(0.9 * room.half / half.max_element());
+        let size = largest.min(0.9 * square.half / half.max_element());
         if size >= LEGIBLE.max(0.5 * largest) {
-            let middle = room.middle + Vec2::new(left as f32, top as f32);
+            let middle = square.middle + Vec2::new(left as f32, top as f32);
             let baseline = middle + size * Vec2::new(-half.x, half.y);
             canvas.text(&number, size, baseline, Rgb::INK, largest / 12.0);
         }
@@ -32,7 +32,7 @@ pub(super) fn draw_numbers(
 
 /// A square of pixels of one region, in pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Room {
+struct Square {
     middle: Vec2,
     /// Half of its side; 0 if the region has no pixel.
     half: f32,
@@ -40,7 +40,7 @@ struct Room {
 
 /// The largest square within each region, on rows of `width` pixels; of equal ones that nearest to the centroid. So it lies in the region also
 /// where the centroid does not.
-fn rooms(pixels: &[Option<u32>], width: usize) -> Vec<Room> {
+fn largest_squares(pixels: &[Option<u32>], width: usize) -> Vec<Square> {
     let reach = chessboard_distances(pixels, width);
     let count = pixels.iter().flatten().max().map_or(0, |&last| last as usize + 1);
     let place = |i: usize| DVec2::new((i % width) as f64, (i / width) as f64) + 0.5;
@@ -51,16 +51,16 @@ fn rooms(pixels: &[Option<u32>], width: usize) -> Vec<Room> {
         sums[region].0 += place(i);
         sums[region].1 += 1.0;
     }
-    let mut rooms = vec![Room::default(); count];
+    let mut squares = vec![Square::default(); count];
     for (i, region) in labelled() {
         let off = |at: DVec2| at.distance_squared(sums[region].0 / sums[region].1);
-        let (room, half) = (&mut rooms[region], reach[i] as f32 - 0.5);
-        let is_nearer = || off(place(i)) < off(room.middle.as_dvec2());
-        if half > room.half || (half == room.half && is_nearer()) {
-            *room = Room { middle: place(i).as_vec2(), half };
+        let (square, half) = (&mut squares[region], reach[i] as f32 - 0.5);
+        let is_nearer = || off(place(i)) < off(square.middle.as_dvec2());
+        if half > square.half || (half == square.half && is_nearer()) {
+            *square = Square { middle: place(i).as_vec2(), half };
         }
     }
-    rooms
+    squares
 }
 
 /// Steps of a chess king from each pixel to the nearest that is of another region or outside (Rosenfeld and Pfaltz 1966: two passes are enough).
@@ -102,13 +102,13 @@ mod tests {
                        0000000000";
         let pixels: Vec<_> =
             picture.lines().flat_map(|l| l.chars().map(|c| c.to_digit(10))).collect();
-        let at = |x: f32, y: f32, half| Room { middle: Vec2::new(x, y), half };
+        let at = |x: f32, y: f32, half| Square { middle: Vec2::new(x, y), half };
         // Region 0 is a C around 2, whose centroid is in 2; region 2 a ring around 1, widest in the west.
-        let rooms = rooms(&pixels, 10);
+        let squares = largest_squares(&pixels, 10);
         assert_eq!(
-            rooms,
+            squares,
             [at(1.5, 4.5, 1.5), at(7.5, 4.5, 1.5), at(4.5, 4.5, 1.5), at(9.5, 7.5, 0.5)]
         );
-        assert!(super::rooms(&[None; 4], 2).is_empty());
+        assert!(super::largest_squares(&[None; 4], 2).is_empty());
     }
 }

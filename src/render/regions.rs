@@ -43,13 +43,13 @@ impl RegionLayer<'_> {
             layout.canvas.lines(&lines, width * layout.unit, Rgb::INK, 0.7);
         }
         for &seed in &self.seeds {
-            let at = layout.place(seed);
+            let at = layout.to_pixels(seed);
             let [radius, rim] = SEED.map(|size| size * layout.unit);
             layout.canvas.disc(at, radius, rim, Rgb::INK);
         }
     }
 
-    /// Writes the numbers beside the seeds; `node` is the one at grid coordinates.
+    /// Writes the numbers, away from the marks of the seeds; `node` gives the node nearest to grid coordinates.
     pub(super) fn draw_numbers(
         &self,
         layout: &mut MapLayout,
@@ -59,7 +59,7 @@ impl RegionLayer<'_> {
         let ([left, top, width, height], mut pixels) = layout.sample(label);
         let reach = SEED.iter().sum::<f32>() * layout.unit;
         for &seed in &self.seeds {
-            let at = layout.place(seed) - Vec2::new(left as f32, top as f32);
+            let at = layout.to_pixels(seed) - Vec2::new(left as f32, top as f32);
             let span = |at: f32, end: usize| {
                 (at - reach).max(0.0) as usize..end.min((at + reach) as usize + 1)
             };

@@ -32,7 +32,7 @@ pub struct SurfacePicture<'a> {
     pub lines: Vec<(Vec<DVec2>, Rgb)>,
     /// Points in grid coordinates, such as seeds. Default: none.
     pub points: Vec<(DVec2, Rgb)>,
-    /// Direction from the surface to who looks at it. Default: (1, −2, 1).
+    /// Direction from the surface to the viewer. Default: (1, −2, 1).
     pub view: DVec3,
     /// The line above the surface; empty for none.
     pub title: String,
@@ -91,7 +91,7 @@ impl<'a> SurfacePicture<'a> {
             (0..rows).into_par_iter().flat_map_iter(|row| self.vertices(row, &camera)).collect();
         let mut buffer = DepthBuffer::new(&nodes, self.max_side_px)?;
         self.draw_cells(&mut buffer, &nodes);
-        let place = |at: DVec2| camera.place(self.surface.space_jet(at).point);
+        let place = |at: DVec2| camera.project(self.surface.space_jet(at).point);
         for (line, colour) in &self.lines {
             for ends in line.windows(2) {
                 buffer.line(place(ends[0]), place(ends[1]), *colour);
@@ -149,7 +149,7 @@ impl<'a> SurfacePicture<'a> {
         jets.map(|(col, jet)| {
             let known = !self.surface.is_void(col, row) && jet.point.is_finite();
             known.then(|| Vertex {
-                at: camera.place(jet.point),
+                at: camera.project(jet.point),
                 light: camera.light(jet.normal()),
                 colour: self.colours[row * self.surface.cols() + col],
                 region: self.regions.get(row * self.surface.cols() + col).copied().flatten(),

@@ -48,7 +48,7 @@ impl Comparison {
     }
 
     /// Cost of route `route` under metric `metric`, divided by the least cost of any of the routes under it; 1 for
-    /// the best, also where the goal is on the start and all costs are 0.
+    /// the best, also where the goal is on the start and all costs are 0. Both are indices, as in [`costs`](Self::costs).
     #[must_use]
     pub fn ratio(&self, metric: usize, route: usize) -> f64 {
         let costs = &self.costs[metric];

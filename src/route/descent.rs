@@ -96,8 +96,7 @@ fn descend_to_node(distance: &DistanceMap, at: DVec2) -> Option<(DVec2, f64)> {
 mod tests {
     use super::*;
     use crate::control::Control;
-    use crate::eikonal::TensorField;
-    use crate::eikonal::{Solver, StartRegion, Stop};
+    use crate::eikonal::{Solver, StartRegion, Stop, TensorField};
     use crate::linalg::Sym2;
 
     fn solve(

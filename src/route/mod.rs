@@ -1,7 +1,7 @@
 //! Distances become routes: polylines from the start region to a goal, with their numbers.
 //!
 //! [`trace`] follows the distance down from the goal (`descent.rs`) and moves the line to where it is shortest on the
-//! surface itself (`polish.rs`); [`Summary`] and [`ProfilePoint`] measure the line on
+//! surface itself (`polish/`); [`Summary`] and [`ProfilePoint`] measure the line on
 //! the smooth surface (`profile.rs`); [`Comparison`] sets the routes of several metrics side by side.
 
 mod compare;
@@ -13,8 +13,7 @@ use glam::{DVec2, DVec3};
 
 pub use self::compare::Comparison;
 pub use self::profile::{ProfilePoint, Summary};
-use crate::eikonal::DistanceMap;
-use crate::eikonal::{TensorField, has_line_of_sight};
+use crate::eikonal::{DistanceMap, TensorField, has_line_of_sight};
 use crate::error::{Error, Location, Result};
 use crate::linalg::Sym2;
 use crate::metric::MetricField;
@@ -40,6 +39,9 @@ pub struct Route {
 /// `metric`, which knows the surface between the nodes too; it never costs more than that line. [`Summary::cost`] is measured
 /// between the nodes as well, so it differs from the distance at the goal by the errors of both. In a closed direction the line
 /// begins at the image of the start that is nearest to the goal.
+///
+/// # Cost
+/// 1 to 2 ms for a route of 130 cells, 8 to 20 where costs jump from cell to cell. `docs/mathematics.md` has measurements.
 ///
 /// # Errors
 /// [`Error::NoPath`] if the front did not reach the goal; [`Error::Argument`] if the goal is not on the grid or the metric has no
@@ -92,7 +94,8 @@ fn is_open_around(field: &TensorField, a: DVec2, b: DVec2) -> bool {
 }
 
 impl Route {
-    /// A route along a given line in grid coordinates, measured under `metric`.
+    /// A route along a given line in grid coordinates (column, row), measured under `metric`. Whether the line enters closed nodes is not looked
+    /// at.
     #[must_use]
     pub fn from_line(grid: Vec<DVec2>, metric: &MetricField<'_>) -> Self {
         let surface = metric.surface();

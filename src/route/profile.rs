@@ -107,7 +107,7 @@ fn length_in_space(surface: &dyn Surface, line: &[DVec2]) -> f64 {
     length_along(line, |at, by| surface.jet(at).first_form().norm(by))
 }
 
-/// What the surface does along a direction.
+/// Slopes and curvature of the surface along a direction.
 struct Course {
     /// Rise per plan length along it.
     grade: f64,
@@ -198,7 +198,8 @@ impl Summary {
 }
 
 impl Route {
-    /// Samples at equal steps of at most `step` metres along the surface, both ends included.
+    /// Samples of a route of at least one point at equal steps of at most `step` metres along the surface, both ends included; never more than
+    /// a million steps.
     #[must_use]
     pub fn profile(&self, surface: &dyn Surface, step: f64) -> Vec<ProfilePoint> {
         let mut knots = vec![(0.0, self.grid[0])];
@@ -207,7 +208,7 @@ impl Route {
             knots.push((travelled + Piece::new(surface, from, to).length, to));
         }
         let total = knots[knots.len() - 1].0;
-        let count = (total / step).ceil().clamp(1.0, MAX_SAMPLES);
+        let count = (total / step).ceil().clamp(1.0, MAX_STEPS);
         let mut next = 1;
         (0..=count as usize)
             .map(|i| {
@@ -221,8 +222,8 @@ impl Route {
     }
 }
 
-/// No profile needs more samples.
-const MAX_SAMPLES: f64 = 1e6;
+/// No profile needs more steps.
+const MAX_STEPS: f64 = 1e6;
 
 fn sample(
     surface: &dyn Surface,

@@ -119,7 +119,7 @@ impl MetricArgs {
 
     /// The metric that a user who names none wants.
     pub(crate) fn default_metric(&self) -> NamedMetric {
-        known(if self.tensor.is_some() { TENSOR } else { CURVATURE })
+        metric_named(if self.tensor.is_some() { TENSOR } else { CURVATURE })
     }
 
     /// # Errors
@@ -153,7 +153,7 @@ impl MetricArgs {
     }
 
     /// The first flag given that only a DEM can have.
-    pub(crate) fn of_dems(&self) -> Option<&'static str> {
+    pub(crate) fn dem_only_flag(&self) -> Option<&'static str> {
         let given = [
             ("--climb-weight", self.climb_weight > 0.0),
             ("--max-slope", self.max_slope.is_some()),
@@ -178,15 +178,15 @@ pub(crate) const TENSOR: &str = "tensor";
 /// The metric of a user who names none.
 pub(crate) const CURVATURE: &str = "curvature";
 
-/// The metric of a name that is known to be one.
-pub(crate) fn known(name: &str) -> NamedMetric {
+/// The metric of a name that is one of [`NAMED`].
+pub(crate) fn metric_named(name: &str) -> NamedMetric {
     NamedMetric::find(name).expect("the library has it")
 }
 
 /// Takes the name of a metric.
 pub(super) fn metric() -> impl TypedValueParser<Value = NamedMetric> {
     let names = NAMED.map(|metric| PossibleValue::new(metric.name).help(metric.about));
-    PossibleValuesParser::new(names).map(|name| known(&name))
+    PossibleValuesParser::new(names).map(|name| metric_named(&name))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -9,7 +9,7 @@ mod values;
 
 use clap::{Args, Parser, Subcommand};
 
-pub(crate) use self::ground::{AccuracyName, CURVATURE, FitArgs, GroundArgs, known};
+pub(crate) use self::ground::{AccuracyName, CURVATURE, FitArgs, GroundArgs, metric_named};
 pub(crate) use self::regions::{MatchArgs, RegionArgs, SegmentArgs};
 pub(crate) use self::render::{Picture, RenderArgs};
 pub(crate) use self::routing::{CompareArgs, DistanceArgs, RouteArgs};

@@ -7,7 +7,7 @@ use ridgeway::{Comparison, Control, MetricField, Route, Terrain};
 
 use super::render;
 use super::route::{HEADER, measures, profiles};
-use crate::args::{CURVATURE, CompareArgs, RunArgs, known};
+use crate::args::{CURVATURE, CompareArgs, RunArgs, metric_named};
 use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
 use crate::report::{Report, Table, json, wrote_in};
@@ -36,7 +36,8 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
         .into_iter()
         .map(|metric| scenario::bind(&scenario, metric, &args.ground, run, control))
         .collect::<Result<Vec<_>>>()?;
-    let comparison = scenario.compare(&fields, control).map_err(Failure::between(&scenario))?;
+    let comparison =
+        scenario.compare(&fields, control).map_err(Failure::naming_goals(&scenario))?;
     let table = table(&fields, &comparison).to_string();
     let provenance = scenario.provenance(&fields, Some(command_line()));
     let report = ComparisonReport::new(&fields, &comparison, provenance);
@@ -56,7 +57,7 @@ const EXPLANATION: &str =
 fn metrics(args: &CompareArgs) -> Result<Vec<NamedMetric>> {
     let mut metrics = args.metrics.clone();
     if metrics.is_empty() {
-        metrics = ["isotropic", CURVATURE, "difference"].map(known).into();
+        metrics = ["isotropic", CURVATURE, "difference"].map(metric_named).into();
         metrics.push(args.ground.metric.default_metric());
     }
     args.ground.metric.check_tensor(&metrics)?;

@@ -36,7 +36,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     let (scenario, _) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = scenario::bind(&scenario, name, &args.ground, run, control)?;
     let stop = args.max_distance.map_or(Stop::Never, Stop::Distance);
-    let map = scenario.solve(&field, &stop, control).map_err(Failure::between(&scenario))?;
+    let map = scenario.solve(&field, &stop, control).map_err(Failure::naming_goals(&scenario))?;
     let provenance = scenario.provenance(std::slice::from_ref(&field), Some(command_line()));
     let isolines = match &args.isolines {
         Some(path) => Some((path, isolines_file(args, &scenario, &map, &provenance)?)),

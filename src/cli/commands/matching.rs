@@ -16,7 +16,7 @@ use ridgeway::{Control, Modifiers, Surface, Terrain};
 
 use super::render::title;
 use super::segment::{Sampled, cut};
-use crate::args::{CURVATURE, MatchArgs, RunArgs, known};
+use crate::args::{CURVATURE, MatchArgs, RunArgs, metric_named};
 use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
 use crate::report::{Report, Table, digits, json, metres, wrote_in};
@@ -135,13 +135,13 @@ impl<'a> Subject<'a> {
 }
 
 fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Ground, Sampled)> {
-    if let Some(flag) = args.ground.metric.of_dems() {
+    if let Some(flag) = args.ground.metric.dem_only_flag() {
         let name = path.display();
         return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
     }
     let (cols, rows) = args.nodes;
     let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
-    let metric = args.ground.metric.metric(args.metric.unwrap_or(known(CURVATURE)), None)?;
+    let metric = args.ground.metric.metric(args.metric.unwrap_or(metric_named(CURVATURE)), None)?;
     let sampled = Sampled::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
     Ok((Ground::Nurbs(Box::new(surface)), sampled))
 }

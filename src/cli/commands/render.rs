@@ -64,8 +64,9 @@ fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>
     let places = (&args.start[..], &args.goal[..]);
     let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let fields = [scenario::bind(&scenario, name, &args.ground, run, control)?];
-    let distances =
-        [scenario.solve(&fields[0], &Stop::Never, control).map_err(Failure::between(&scenario))?];
+    let distances = [scenario
+        .solve(&fields[0], &Stop::Never, control)
+        .map_err(Failure::naming_goals(&scenario))?];
     let routes = scenario.routes_on(&distances[0], &fields[0], control)?;
     map((&scenario, &terrain), &fields, &routes, &distances, args.width, control)
 }

@@ -23,7 +23,7 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
     let places = (&args.start.start[..], &args.goal[..]);
     let (scenario, _) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = scenario::bind(&scenario, name, &args.ground, run, control)?;
-    let routes = scenario.routes(&field, control).map_err(Failure::between(&scenario))?;
+    let routes = scenario.routes(&field, control).map_err(Failure::naming_goals(&scenario))?;
     control.check()?;
     let names: Vec<_> = scenario.goals.iter().map(|goal| format!("to {}", goal.name)).collect();
     let named: Vec<_> = names.iter().map(String::as_str).zip(&routes).collect();

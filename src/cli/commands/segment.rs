@@ -38,17 +38,17 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     let (regions, solver) = (&args.regions, args.ground.metric.solver());
     let segmentation = cut(&scenario.surface, sampled, regions, solver, control)?;
     let measures = measures(&segmentation, &scenario.surface, control)?;
-    let outcome = Regions { scenario: &scenario, metric: &metric, segmentation, measures };
+    let result = Regions { scenario: &scenario, metric: &metric, segmentation, measures };
     control.check()?;
     let provenance = scenario.provenance(std::slice::from_ref(&metric), Some(command_line()));
     for (path, format) in args.output.iter().zip(&formats) {
         match (format.as_str(), &relief) {
             ("png", Some(terrain)) => {
-                let picture = outcome.picture(terrain, title(&args.dem))?;
+                let picture = result.picture(terrain, title(&args.dem))?;
                 write_content(path, args.overwrite, &picture)?;
             }
-            ("tif" | "tiff", _) => outcome.write_labels(path, args.overwrite)?,
-            _ => write_content(path, args.overwrite, &outcome.polygons(&provenance)?)?,
+            ("tif" | "tiff", _) => result.write_labels(path, args.overwrite)?,
+            _ => write_content(path, args.overwrite, &result.polygons(&provenance)?)?,
         }
     }
     let written: String = args.output.iter().map(|path| wrote(path)).collect();
@@ -56,10 +56,10 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         metric: metric.name().to_owned(),
         unit: metric.unit(),
         delta_per_m: metric.parameter("delta_per_m"),
-        regions: outcome.records().collect(),
+        regions: result.records().collect(),
         provenance,
     };
-    Report::new(outcome.text() + &written, report).print(run)
+    Report::new(result.text() + &written, report).print(run)
 }
 
 /// A metric at the nodes of a surface, and the order in which these are tried as seeds.

@@ -17,7 +17,7 @@ pub struct DistanceReport {
     pub unit: Unit,
     /// `δ` of the metric in 1/m, if it has one.
     pub delta_per_m: Option<f64>,
-    /// `δ` of changes of curvature, if it has one.
+    /// `δ` of the difference metrics, if it has one: no unit, or m² if literal.
     pub difference_delta: Option<f64>,
     /// Number of cells.
     pub cells: usize,
@@ -74,7 +74,7 @@ pub struct SolverWork {
     /// The counts of the solve.
     #[serde(flatten)]
     pub counts: Statistics,
-    /// Memory of the distance map, tensors included.
+    /// Memory of the distance map in bytes per node, tensors included.
     pub bytes_per_node: usize,
 }
 
@@ -89,7 +89,8 @@ impl DistanceReport {
         provenance: Provenance,
     ) -> Self {
         let (reached, largest) = reached(map);
-        let mut distance = if quantiles { spread(map) } else { DistanceStatistics::default() };
+        let mut distance =
+            if quantiles { quantiles_and_error(map) } else { DistanceStatistics::default() };
         distance.largest = (reached > 0).then_some(largest);
         let goals = scenario.goals.iter().filter_map(|goal| {
             Some(GoalDistance { goal: goal.name.clone(), distance: map.at(goal.at)? })
@@ -121,8 +122,8 @@ fn reached(map: &DistanceMap) -> (usize, f64) {
     (0..map.rows()).into_par_iter().map(of_row).reduce(|| (0, 0.0), both)
 }
 
-/// Quantiles of the distances and mean of the errors.
-fn spread(map: &DistanceMap) -> DistanceStatistics {
+/// Quantiles of the distances and mean of the estimated errors.
+fn quantiles_and_error(map: &DistanceMap) -> DistanceStatistics {
     let mut values = map.to_row_major();
     values.retain(|value| value.is_finite());
     values.par_sort_unstable_by(f32::total_cmp);

@@ -5,8 +5,7 @@ use rayon::prelude::*;
 use crate::control::Control;
 use crate::error::Result;
 use crate::grid::tiling::wrap;
-use crate::surface::Surface;
-use crate::surface::{BLOCK, Block, JetBlock, Lanes, SpaceLanes};
+use crate::surface::{BLOCK, Block, JetBlock, Lanes, SpaceLanes, Surface};
 
 /// A surface cut into regions.
 pub(super) struct Cut<'a> {
@@ -33,7 +32,7 @@ pub(super) trait Sum: Clone + Default + Send {
 }
 
 impl Run<'_> {
-    /// A number of the region of each node.
+    /// `of` the region of each node; `NaN` at nodes of none.
     pub(super) fn of_regions(&self, of: impl Fn(usize) -> f64) -> Lanes {
         let mut lanes = [0.0; BLOCK];
         for (lane, label) in lanes.iter_mut().zip(self.labels) {
@@ -44,7 +43,7 @@ impl Run<'_> {
 }
 
 impl Cut<'_> {
-    /// Goes through the nodes of [`BLOCK`] rows, run by run: from left to right in each row.
+    /// Goes through the nodes of [`BLOCK`] rows from row `first` on, run by run: from left to right in each row.
     pub(super) fn visit(&self, first: usize, control: &Control, mut visit: impl FnMut(&Run<'_>)) {
         let mut run = Run { node: [0; 2], labels: &[], jets: SpaceLanes::default() };
         let mut jets = JetBlock::default();
@@ -105,7 +104,7 @@ impl Cut<'_> {
         rows
     }
 
-    /// The node at a place beside the grid or in it.
+    /// Index of the node at a column and row in the grid or beside it, over the seam of a closed direction; `None` beyond a border.
     pub(super) fn node(&self, col: isize, row: isize) -> Option<usize> {
         let [across, down] = self.periodic;
         Some(wrap(row, self.rows, down)? * self.cols + wrap(col, self.cols, across)?)

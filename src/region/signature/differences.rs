@@ -7,11 +7,10 @@ use glam::DVec2;
 use super::cut::Run;
 use super::extent::Size;
 use super::moments::Moments;
-use super::tensors::{MISSING, Tensor, Tensors, apart, sum};
+use super::tensors::{MISSING, Tensor, Tensors, squared_distance, sum};
 use crate::linalg::Sym2;
 use crate::linalg::simd::Kernel;
-use crate::surface::SurfaceJet;
-use crate::surface::{BLOCK, Lanes};
+use crate::surface::{BLOCK, Lanes, SurfaceJet};
 
 /// Distance of the neighbours on the surface as a share of the region's size. Finite, or opposite neighbours would not
 /// differ and two of the eigenvalues be 0.
@@ -42,7 +41,7 @@ impl Kernel for AlongSurface<'_> {
             let Some(region) = *label else { continue };
             for k in 0..4 {
                 let at = DVec2::new(neighbours[k][0][i], neighbours[k][1][i]);
-                squares[k][i] = tensors.apart(first + i, cells[k][i], at, region);
+                squares[k][i] = tensors.squared_distance(first + i, cells[k][i], at, region);
             }
         }
         let (mut pairs, mut areas) = ([[0.0; BLOCK]; 4], [0.0; BLOCK]);
@@ -62,7 +61,7 @@ impl Kernel for AlongSurface<'_> {
     }
 }
 
-/// The same for the neighbours on the grid, as shares of the region's size.
+/// Moments of the differences to the neighbours on the grid, as shares of the region's size.
 pub(super) fn along_grid(
     tensors: &Tensors<'_>,
     sizes: &[Size],
@@ -70,16 +69,25 @@ pub(super) fn along_grid(
     moments: &mut [Moments; BLOCK],
 ) {
     for (i, label) in run.labels.iter().enumerate() {
-        let moments_of = |region: u32| {
-            let side = sizes[region as usize].side;
-            let node = [run.node[0] + i, run.node[1]];
-            let [a, b] = grid_differences(tensors, node, [1, 0], side, region)?;
-            let [c, d] = grid_differences(tensors, node, [0, 1], side, region)?;
-            let jet = run.jets.get(i);
-            jet.is_regular().then(|| Moments::of([a, b, c, d], jet.area()))
-        };
-        moments[i] = label.and_then(moments_of).unwrap_or_default();
+        let of_region = |region| grid_moments(tensors, sizes, run, i, region);
+        moments[i] = label.and_then(of_region).unwrap_or_default();
     }
+}
+
+/// Moments of the differences at node `i` of a run; `None` where all neighbours on a line are missing or the surface is degenerate.
+fn grid_moments(
+    tensors: &Tensors<'_>,
+    sizes: &[Size],
+    run: &Run<'_>,
+    i: usize,
+    region: u32,
+) -> Option<Moments> {
+    let side = sizes[region as usize].side;
+    let node = [run.node[0] + i, run.node[1]];
+    let [a, b] = grid_differences(tensors, node, [1, 0], side, region)?;
+    let [c, d] = grid_differences(tensors, node, [0, 1], side, region)?;
+    let jet = run.jets.get(i);
+    jet.is_regular().then(|| Moments::of([a, b, c, d], jet.area()))
 }
 
 /// Differences to the two neighbours of a node on one line of the grid, as shares of `side`; one for both where the other is
@@ -95,7 +103,7 @@ fn grid_differences(
     let here = tensors.at(col, row, region)?;
     let [after, before] = [1, -1].map(|by| {
         let there = tensors.at(col + by * x, row + by * y, region)?;
-        Some(apart(here, there).sqrt() / side)
+        Some(squared_distance(here, there).sqrt() / side)
     });
     Some([after.or(before)?, before.or(after)?])
 }
@@ -161,7 +169,7 @@ fn neighbours(run: &Run<'_>, steps: &Lanes, changes: &[Lanes; 3]) -> [[Lanes; 2]
             tangents(jet.first_form(), Sym2::new(changes[0][i], changes[1][i], changes[2][i]));
         for k in 0..2 {
             let v = directions[k];
-            let (by, middle) = (v * step, node - bend(&jet, v) * (0.5 * step * step));
+            let (by, middle) = (v * step, node - christoffel(&jet, v) * (0.5 * step * step));
             let (plus, minus) = (middle + by, middle - by);
             [neighbours[2 * k][0][i], neighbours[2 * k][1][i]] = plus.to_array();
             [neighbours[2 * k + 1][0][i], neighbours[2 * k + 1][1][i]] = minus.to_array();
@@ -196,9 +204,9 @@ fn long_axis(form: Sym2) -> DVec2 {
     axis.normalize_or(DVec2::X)
 }
 
-/// `Γ(v, v)`, `Γᵏ_ij = Gᵏˡ S_l·S_ij`.
+/// `Γ(v, v)` of the Christoffel symbols `Γᵏ_ij = Gᵏˡ S_l·S_ij`.
 #[inline(always)]
-fn bend(jet: &SurfaceJet, v: DVec2) -> DVec2 {
+fn christoffel(jet: &SurfaceJet, v: DVec2) -> DVec2 {
     let [xx, xy, yy] = jet.second;
     let second = xx * (v.x * v.x) + xy * (2.0 * v.x * v.y) + yy * (v.y * v.y);
     jet.first_form().inverse().apply(DVec2::new(jet.first[0].dot(second), jet.first[1].dot(second)))

@@ -73,8 +73,8 @@ impl Signature {
 
 /// Signatures of regions `0, 1, …` of a surface, given the region of each node, row-major; nodes of no region are left out.
 ///
-/// `δ` of the curvature tensor is twice the root-mean-square curvature of the region itself: what lies around it has no
-/// say. Neighbours outside the region are missing: where one of two opposite ones is, the other stands for both.
+/// `δ` of the curvature tensor is twice the root-mean-square curvature of the region itself: what lies around it does not
+/// matter. Neighbours outside the region are missing: where one of two opposite ones is, the other stands for both.
 ///
 /// # Cost
 /// Some 0.15 µs of one core per node, and 49 bytes; on NURBS 0.25 µs. `docs/matching.md` has measurements.

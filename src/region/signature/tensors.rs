@@ -12,8 +12,7 @@ use crate::error::Result;
 use crate::linalg::bilinear::{CORNERS, corner_weights};
 use crate::linalg::simd::{self, Kernel};
 use crate::metric::curvature_in_space;
-use crate::surface::SurfaceJet;
-use crate::surface::{BLOCK, Lanes};
+use crate::surface::{BLOCK, Lanes, SurfaceJet};
 
 /// A symmetric tensor in space as `xx, yy, zz, √2 yz, √2 xz, √2 xy`: the length of the vector is the Frobenius norm.
 pub(super) type Tensor = [f64; 6];
@@ -26,7 +25,7 @@ pub(super) fn sum(p: Tensor) -> f64 {
 
 /// `‖a − b‖²`.
 #[inline(always)]
-pub(super) fn apart(a: &Tensor, b: &Tensor) -> f64 {
+pub(super) fn squared_distance(a: &Tensor, b: &Tensor) -> f64 {
     let mut squares = [0.0; 6];
     for k in 0..6 {
         let difference = a[k] - b[k];
@@ -59,7 +58,7 @@ impl<'a> Tensors<'a> {
         Ok(Self { cut, of, inner: cut.inner_cells() })
     }
 
-    /// The tensor at a node, given by its place in or beside the grid, of a region.
+    /// The tensor at a column and row in or beside the grid; `None` unless the node belongs to the region.
     pub(super) fn at(&self, col: isize, row: isize, region: u32) -> Option<&Tensor> {
         let node = self.cut.node(col, row)?;
         (self.cut.labels[node] == Some(region)).then(|| &self.of[node])
@@ -79,7 +78,7 @@ impl<'a> Tensors<'a> {
         })
     }
 
-    /// The first corners of the cells that grid coordinates lie inside of, as places in the row-major grid; [`MISSING`] on the lines of
+    /// The first corners of the cells that grid coordinates lie inside of, as indices in the row-major grid; [`MISSING`] on the lines of
     /// the grid and beyond it.
     #[inline(always)]
     pub(super) fn cells(&self, [cols, rows]: &[Lanes; 2]) -> Lanes {
@@ -97,7 +96,7 @@ impl<'a> Tensors<'a> {
     /// `‖C(x) − C(y)‖²` for a node `x` and grid coordinates `y` in a [cell](Self::cells), bilinear between the nodes; [`MISSING`] unless
     /// they all belong to the region.
     #[inline(always)]
-    pub(super) fn apart(&self, node: usize, cell: f64, at: DVec2, region: u32) -> f64 {
+    pub(super) fn squared_distance(&self, node: usize, cell: f64, at: DVec2, region: u32) -> f64 {
         let (cell, is_cell) = (cell as usize, cell >= 0.0);
         if is_cell && self.inner[cell] && self.cut.labels[cell] == Some(region) {
             let (a, b) = (&self.of[cell..][..2], &self.of[cell + self.cut.cols..][..2]);
@@ -109,7 +108,7 @@ impl<'a> Tensors<'a> {
             }
             return sum(squares);
         }
-        self.sample(at, region).map_or(MISSING, |there| apart(&there, &self.of[node]))
+        self.sample(at, region).map_or(MISSING, |there| squared_distance(&there, &self.of[node]))
     }
 
     /// The tensor beside a border or a seam: nodes one by one, and only those that count.
@@ -135,7 +134,7 @@ impl<'a> Tensors<'a> {
     }
 }
 
-/// What is not there: a place, or the square of a difference.
+/// Stands for what is missing: the index of a cell, or the square of a difference.
 pub(super) const MISSING: f64 = -1.0;
 
 /// `C` at the nodes of a run with the `δ` of each.

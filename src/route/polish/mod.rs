@@ -31,10 +31,10 @@ use self::search::search;
 use crate::linalg::Sym2;
 use crate::metric::length_along;
 
-/// Longest segment in cells. The curvature tensor changes within a cell: on rough ground segments of one cell shorten routes
+/// Longest segment, in cells. The curvature tensor changes within a cell: on rough ground segments of one cell shorten routes
 /// by a half to two thirds of what those of half a cell do, a quarter by 1.1 times as much for twice the work.
 const SEGMENT: f64 = 0.5;
-/// Enough for all but a few lines on the roughest ground; smooth metrics need 3 to 5.
+/// Most steps of Newton's method, and of the search at each stride. Enough for all but a few lines on the roughest ground; smooth metrics need 3 to 5.
 const MOST_STEPS: usize = 40;
 /// A line that ends with a larger shift hardly moved, for the metric jumps beside it. The curvature tensor on rough ground ends
 /// with up to 200, costs that jump by 1 : 10 with 70 to 3000, by 1 : 50 with 27 000.
@@ -90,7 +90,7 @@ fn shorter(
     points: &[DVec2],
     metric: &impl Fn(DVec2) -> Sym2,
 ) -> Vec<DVec2> {
-    let length = |line: &[DVec2]| finely(line, metric);
+    let length = |line: &[DVec2]| fine_length(line, metric);
     let shared: Vec<usize> = (0..kept.len()).filter(|&k| points[k] == line[kept[k]]).collect();
     let mut best = vec![line[0]];
     for ends in shared.windows(2) {
@@ -103,7 +103,7 @@ fn shorter(
 }
 
 /// Length by the finer quadrature.
-fn finely(line: &[DVec2], metric: &impl Fn(DVec2) -> Sym2) -> f64 {
+fn fine_length(line: &[DVec2], metric: &impl Fn(DVec2) -> Sym2) -> f64 {
     length_along(line, |at, by| metric(at).norm(by))
 }
 

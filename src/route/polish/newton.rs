@@ -13,13 +13,13 @@ use crate::linalg::Sym2;
 const PROBE: f64 = 0.25;
 /// No point moves farther at once, in cells: walls are met gently.
 const LONGEST_MOVE: f64 = 1.0;
-/// A line that moves less, in cells, has arrived.
-const STILL: f64 = 1e-3;
+/// A line that moves less, in cells, has converged.
+const LEAST_MOVE: f64 = 1e-3;
 /// So has one that became shorter by less than this share: what is left to gain is less still.
 const LEAST_GAIN: f64 = 1e-7;
 /// A step that should bring less than this share of the length, and brings nothing, is noise.
 const NOISE: f64 = 1e-6;
-/// Shifts between the first one above 0 and the end of all hope.
+/// The least shift above 0, and the one beyond which the search for a step is given up.
 const SHIFTS: Range<f64> = 1e-3..1e6;
 
 /// Moves the points to where the length is least, or nearer to there. Returns the last shift.
@@ -33,7 +33,7 @@ pub(super) fn relax(
     for _ in 0..MOST_STEPS {
         let length = length(line.points, &line.middles);
         let Some(Move { farthest, gained }) = line.step(length) else { break };
-        if farthest < STILL || gained < LEAST_GAIN * length {
+        if farthest < LEAST_MOVE || gained < LEAST_GAIN * length {
             break;
         }
         line.shift = if line.shift > SHIFTS.start { 0.2 * line.shift } else { 0.0 };
@@ -104,7 +104,7 @@ impl<M: Fn(DVec2) -> Sym2, C: Fn(DVec2, DVec2) -> bool> Relaxation<'_, M, C> {
             (*self.points, self.middles) = (moved, middles);
             return Attempt::Shorter(Move { farthest, gained });
         }
-        let is_noise = farthest < STILL || newton.promise(&step) < NOISE * length;
+        let is_noise = farthest < LEAST_MOVE || newton.predicted_decrease(&step) < NOISE * length;
         if is_noise { Attempt::Noise } else { Attempt::Longer }
     }
 }
@@ -157,8 +157,8 @@ struct Newton {
     gradient: Vec<f64>,
     diagonal: Vec<f64>,
     /// `∂²L/∂s_i∂s_{i+1}`.
-    beside: Vec<f64>,
-    /// What the shift is counted in: `Σ nᵀ M n / |d|` over the two segments of a point.
+    off_diagonal: Vec<f64>,
+    /// What the shift is a multiple of: `Σ nᵀ M n / |d|` over the two segments of a point.
     tension: Vec<f64>,
 }
 
@@ -171,7 +171,7 @@ impl Newton {
     ) -> Self {
         let zeros = || vec![0.0; points.len()];
         let mut sums =
-            Self { gradient: zeros(), diagonal: zeros(), beside: zeros(), tension: zeros() };
+            Self { gradient: zeros(), diagonal: zeros(), off_diagonal: zeros(), tension: zeros() };
         for (k, &middle) in middles.iter().enumerate() {
             sums.add(k, [points[k], points[k + 1]], [across[k], across[k + 1]], middle, metric);
         }
@@ -210,7 +210,7 @@ impl Newton {
         self.gradient[k + 1] += dq;
         self.diagonal[k] += (0.5 * dpp - dp * dp) / l;
         self.diagonal[k + 1] += (0.5 * dqq - dq * dq) / l;
-        self.beside[k] = (0.5 * dpq - dp * dq) / l;
+        self.off_diagonal[k] = (0.5 * dpq - dp * dq) / l;
         self.tension[k] += middle.form(m) / l;
         self.tension[k + 1] += middle.form(n) / l;
     }
@@ -219,25 +219,26 @@ impl Newton {
     fn step(&self, shift: f64, held: &[bool]) -> Option<Vec<f64>> {
         let last = self.gradient.len() - 1;
         let is_free = |i: usize| i > 0 && i < last && !held[i];
-        // L D Lᵀ: `share[i]` is the entry of L beside the diagonal in row i + 1.
+        // L D Lᵀ: `multiplier` is the entry of L beside the diagonal in row i.
         let mut pivots = vec![f64::INFINITY; self.gradient.len()];
         let mut step = vec![0.0; self.gradient.len()];
         for i in (0..last).filter(|&i| is_free(i)) {
-            let share = self.beside[i - 1] / pivots[i - 1];
-            pivots[i] = self.diagonal[i] + shift * self.tension[i] - share * self.beside[i - 1];
+            let multiplier = self.off_diagonal[i - 1] / pivots[i - 1];
+            pivots[i] =
+                self.diagonal[i] + shift * self.tension[i] - multiplier * self.off_diagonal[i - 1];
             if pivots[i].is_nan() || pivots[i] <= 0.0 {
                 return None;
             }
-            step[i] = -self.gradient[i] - share * step[i - 1];
+            step[i] = -self.gradient[i] - multiplier * step[i - 1];
         }
         for i in (0..last).rev().filter(|&i| is_free(i)) {
-            step[i] = (step[i] - self.beside[i] * step[i + 1]) / pivots[i];
+            step[i] = (step[i] - self.off_diagonal[i] * step[i + 1]) / pivots[i];
         }
         Some(step)
     }
 
-    /// By how much a step should shorten the line, about.
-    fn promise(&self, step: &[f64]) -> f64 {
+    /// By how much a step should shorten the line, to second order near the minimum.
+    fn predicted_decrease(&self, step: &[f64]) -> f64 {
         -0.5 * self.gradient.iter().zip(step).map(|(g, s)| g * s).sum::<f64>()
     }
 }

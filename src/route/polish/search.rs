@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{MOST_STEPS, across, finely, refine};
+use super::{MOST_STEPS, across, fine_length, refine};
 use crate::linalg::Sym2;
 
 /// Steps of the search in cells. The finer ones are of no use before the coarser.
@@ -16,7 +16,7 @@ pub(super) fn search(
     metric: &impl Fn(DVec2) -> Sym2,
     clear: &impl Fn(DVec2, DVec2) -> bool,
 ) -> Vec<DVec2> {
-    let mut least = finely(&line, metric);
+    let mut least = fine_length(&line, metric);
     for stride in STRIDES {
         line = refine(&line);
         for _ in 0..MOST_STEPS {
@@ -49,7 +49,7 @@ fn best_beside(
         let (from, to) = (places(i - 1), places(i));
         let path = |j: usize, k: usize| {
             let open = (j, k) == (0, 0) || clear(from[j], to[k]);
-            if open { lengths[j] + finely(&[from[j], to[k]], metric) } else { f64::INFINITY }
+            if open { lengths[j] + fine_length(&[from[j], to[k]], metric) } else { f64::INFINITY }
         };
         let best = [0, 1, 2].map(|k| {
             let paths = [0, 1, 2].map(|j| path(j, k));

@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use super::*;
 use crate::control::Control;
-use crate::eikonal::{DistanceMap, Solver, Stop};
-use crate::eikonal::{TensorField, has_line_of_sight};
+use crate::eikonal::{DistanceMap, Solver, Stop, TensorField, has_line_of_sight};
 use crate::route::descent;
 
 const IDENTITY: Sym2 = Sym2::new(1.0, 0.0, 1.0);
