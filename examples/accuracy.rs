@@ -1,6 +1,6 @@
 //! The accuracy of distances and routes against closed forms, over resolution.
 //!
-//! `cargo run --release --example accuracy` prints the tables of `docs/accuracy.md`.
+//! `cargo run --release --example accuracy` prints the tables of `docs/measurements.md`.
 
 use std::f64::consts::TAU;
 

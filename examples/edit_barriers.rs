@@ -1,6 +1,6 @@
 //! Close a wall, see what changes, and open it again: a map of distances is updated instead of solved anew.
 //!
-//! Prints, for walls of 50 nodes across the way east from the start, the time of an update and of a solve from the
+//! Prints, for walls of 50 nodes across the path east of the start, the time of an update and of a solve from the
 //! beginning, and how many tiles each solved.
 //!
 //! `cargo run --release --example edit_barriers [nodes along a side [repetitions [fast|high]]]`

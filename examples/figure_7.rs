@@ -1,6 +1,6 @@
 //! Figure 7 of Seong, Jeong and Cohen (2008): signatures of the parts of several surfaces.
 //!
-//! `cargo run --release --example figure_7 [FOLDER]` prints λ of each part and how well like parts are told from others, and
+//! `cargo run --release --example figure_7 [FOLDER]` prints λ of each part and how well like parts are distinguished from others, and
 //! draws λ1 and λ2 into FOLDER or `target/figures`.
 
 #[path = "figures/output.rs"]

@@ -34,7 +34,7 @@ pub(crate) enum Problem {
     /// One tensor everywhere, `ratio` times as large across as along an axis turned by 30°; 1 is the flat plane.
     Constant { ratio: f64 },
     /// `D = (ΦᵀΦ)⁻¹`, `Φ = Dφ`, under whose map `φ(x, y) = (x + A sin 2πy, y + A sin 2πx)`, `A` = [`WARP`], shortest
-    /// ways are straight.
+    /// paths are straight.
     Diffeomorphism,
     /// The curvature tensor of five Gaussian hills, from their exact derivatives.
     Hills,

@@ -162,7 +162,7 @@ pub(crate) fn points() -> Result<Vec<Point>> {
     Ok(pairs.filter_map(|(point, alone)| (!alone).then_some(point)).collect())
 }
 
-/// How well like parts are told from others: the share of points whose nearest one is of the same part, and the mean
+/// How well like parts are distinguished from others: the share of points whose nearest one is of the same part, and the mean
 /// silhouette (Rousseeuw 1987).
 pub(crate) fn separation(points: &[Point]) -> [f64; 2] {
     let mut sums = [0.0; 2];

@@ -37,7 +37,7 @@ pub(crate) fn exact(problem: Problem) -> Option<Exact> {
 }
 
 /// Speed `1 + x` is the Poincaré half-plane with boundary `x = −1`: `cosh g = 1 + |p|²/(2(1 + x))` from the origin, and
-/// shortest ways are arcs of circles centred on the boundary. Not valid where the arc leaves the square at `x = 1/2`.
+/// shortest paths are arcs of circles centred on the boundary. Not valid where the arc leaves the square at `x = 1/2`.
 fn half_plane(at: DVec2) -> Option<f64> {
     // The arc through the origin and `at` is centred at (−1, centre).
     let centre = ((1.0 + at.x).powi(2) + at.y * at.y - 1.0) / (2.0 * at.y);
@@ -46,7 +46,7 @@ fn half_plane(at: DVec2) -> Option<f64> {
     (!bulges).then(|| (1.0 + at.length_squared() / (2.0 * (1.0 + at.x))).acosh())
 }
 
-/// The map that straightens the shortest ways of [`Problem::Diffeomorphism`].
+/// The map that straightens the shortest paths of [`Problem::Diffeomorphism`].
 fn phi(at: DVec2) -> DVec2 {
     at + WARP * DVec2::new((TAU * at.y).sin(), (TAU * at.x).sin())
 }
