@@ -66,7 +66,7 @@ impl JetBlock {
         }
     }
 
-    /// Gives the node in column `i` of row `j` a jet. One of another kind than the others makes room anew.
+    /// Gives the node in column `i` of row `j` a jet. A jet of another kind than those it holds replaces them all.
     ///
     /// # Panics
     /// As [`get`](Self::get).

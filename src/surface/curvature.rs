@@ -10,7 +10,7 @@ use super::bspline::block::{BLOCK, HeightBlock, Lanes};
 use crate::linalg::Sym2;
 use crate::linalg::simd::Kernel;
 
-/// Curvatures of a surface at one point.
+/// Curvatures of a surface at one point, with the directions of the principal ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrincipalCurvatures {
     /// Gaussian curvature `K = κ1 κ2`, 1/m².

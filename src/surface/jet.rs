@@ -141,14 +141,14 @@ impl HeightJet {
     }
 }
 
-/// A point of a surface and the derivatives there by the two parameters.
+/// A point of a surface in space and the derivatives there by the two parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfaceJet {
-    /// `S`, m.
+    /// The point `S`, m.
     pub point: DVec3,
-    /// `S_1` and `S_2`.
+    /// First derivatives `S_1` and `S_2`, m per unit of the parameter.
     pub first: [DVec3; 2],
-    /// `S_11`, `S_12` and `S_22`.
+    /// Second derivatives `S_11`, `S_12` and `S_22`.
     pub second: [DVec3; 3],
 }
 
@@ -174,7 +174,7 @@ impl SurfaceJet {
         Sym2::new(a.length_squared(), a.dot(b), b.length_squared())
     }
 
-    /// Unit normal `S_2 × S_1/‖·‖`: towards who sees columns run right and rows down. Not finite where the surface
+    /// Unit normal `S_2 × S_1/‖·‖`: towards a viewer who sees columns run right and rows down. Not finite where the surface
     /// is degenerate.
     #[must_use]
     pub fn normal(&self) -> DVec3 {

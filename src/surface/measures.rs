@@ -1,10 +1,10 @@
-//! The numbers of a whole surface that scale what happens on it.
+//! Area, curvature and extent of a whole surface: what automatic parameters are scaled by.
 
 use rayon::prelude::*;
 
 use super::Surface;
 
-/// See [`Surface::measures`].
+/// Area, curvature and extent of a whole surface, see [`Surface::measures`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
     /// Area of the surface, m².

@@ -2,7 +2,7 @@
 //!
 //! [`Surface`] is all that metrics, routes and regions ask of one. [`HeightSurface`] fits a tensor-product B-spline (`bspline/`)
 //! to the heights of a terrain; [`NurbsGrid`] is a [`NurbsSurface`] of any form with nodes. A user's own needs three
-//! methods: how many columns and rows, and the [`Jet`] at a point. `curvature` says what the derivatives say of the shape.
+//! methods: how many columns and rows, and the [`Jet`] at a point. `curvature` derives slope, normal and curvatures from a jet.
 
 mod block;
 mod bspline;
@@ -62,7 +62,7 @@ pub trait Surface: Sync {
         false
     }
 
-    /// Whether any node is missing.
+    /// Whether any node is missing; by default every node is asked.
     fn has_voids(&self) -> bool {
         (0..self.rows()).any(|row| (0..self.cols()).any(|col| self.is_void(col, row)))
     }
@@ -85,7 +85,7 @@ pub trait Surface: Sync {
         self.frame().map_or(DVec3::new(x, y, z), |frame| frame.to_map(at).extend(z))
     }
 
-    /// Jets at the nodes of a block. Surfaces that evaluate many nodes faster than one by one say how.
+    /// Jets at the nodes of a block. To be overridden where many together are faster than one by one.
     fn block_jets(&self, block: &Block, jets: &mut JetBlock) {
         for (j, i, at) in block.nodes() {
             jets.set(j, i, self.jet(at));

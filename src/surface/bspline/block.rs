@@ -190,7 +190,7 @@ fn accumulate(sum: &mut Lanes, weight: f64, values: &Lanes) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::knots::Plan;
+    use super::super::knots::FitPlan;
     use super::*;
     use crate::control::Control;
     use crate::grid::{GridFrame, Ground};
@@ -200,7 +200,7 @@ mod tests {
         let frame = GridFrame::new(53, 21, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap();
         let heights: Vec<f64> = (0..frame.nodes()).map(|i| (i as f64).sin() * 1e3).collect();
         for degree in [3, 5] {
-            let plan = Plan::every_node(&frame, degree);
+            let plan = FitPlan::every_node(&frame, degree);
             let fit = Fit::new(&frame, &heights, &plan, &Control::default()).unwrap();
             assert!(fit.x.uniform.contains(&16) && fit.x.uniform.contains(&31));
             let mut jets = HeightBlock::default();

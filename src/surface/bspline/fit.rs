@@ -32,7 +32,7 @@ use rayon::prelude::*;
 
 use super::banded::{Banded, Ldl};
 use super::basis::{Basis, Local, SUPPORT};
-use super::knots::Plan;
+use super::knots::FitPlan;
 use crate::control::Control;
 use crate::error::Result;
 use crate::grid::GridFrame;
@@ -49,8 +49,8 @@ const LONGEST_CUTOFF: f64 = 64.0;
 /// Columns, or rows, that are solved together.
 pub(in crate::surface) const LANES: usize = 16;
 
-/// Relative difference of cut-offs that is not felt: a wave at the cut-off keeps 0.5 ± 0.0015 of its amplitude.
-const SHARED: f64 = 1e-3;
+/// Relative difference of cut-offs up to which rows share one: a wave at the cut-off keeps 0.5 ± 0.0015 of its amplitude.
+const SHARED_CUTOFF_TOLERANCE: f64 = 1e-3;
 
 /// Splines along one axis and their values at the nodes.
 #[derive(Clone, Debug)]
@@ -96,7 +96,7 @@ impl Axis {
     /// A cut-off of `cells` nodes, kept where the equations are sound.
     pub(in crate::surface) fn cutoff(&self, cells: f64) -> f64 {
         // Fewer knots than nodes without smoothing may leave a coefficient almost without data where
-        // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and is not felt otherwise.
+        // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and changes nothing otherwise.
         let shortest = if self.basis.len() < self.nodes.len() { 0.3 } else { 0.0 };
         cells.clamp(shortest / self.basis.density(), LONGEST_CUTOFF / self.basis.density())
     }
@@ -218,7 +218,7 @@ impl Fit {
     pub(in crate::surface) fn new(
         frame: &GridFrame,
         heights: &[f64],
-        plan: &Plan,
+        plan: &FitPlan,
         control: &Control,
     ) -> Result<Self> {
         let x = Axis::new(plan.degree, frame.cols(), plan.intervals[0]);
@@ -294,7 +294,7 @@ pub(in crate::surface) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Fits every row of heights: as many rows of `coefficients`.
 ///
 /// [`LANES`] rows are solved together. Where meridians converge their cells differ in width; they share the cut-off in
-/// cells of the middle one if that changes none by more than [`SHARED`].
+/// cells of the middle one if that changes none by more than [`SHARED_CUTOFF_TOLERANCE`].
 fn solve_rows(
     frame: &GridFrame,
     axis: &Axis,
@@ -316,8 +316,8 @@ fn solve_rows(
         control.check()?;
         let (first, count) = (group * LANES, heights.len() / cols);
         let shared = cells(first + count / 2);
-        let all = (cells(first) - shared).abs().max((cells(first + count - 1) - shared).abs());
-        if all <= SHARED * shared {
+        let spread = (cells(first) - shared).abs().max((cells(first + count - 1) - shared).abs());
+        if spread <= SHARED_CUTOFF_TOLERANCE * shared {
             solve_lines::<LANES>(axis, &normal(shared), heights, coefficients);
         } else {
             let rows = heights.chunks(cols).zip(coefficients.chunks_mut(width));

@@ -10,7 +10,7 @@ const KNOTS_PER_CUTOFF: f64 = 16.0;
 
 /// What to fit: the knots and the smoothing.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::surface) struct Plan {
+pub(in crate::surface) struct FitPlan {
     /// Degree of the splines, 3 or 5.
     pub(in crate::surface) degree: usize,
     /// Knot intervals along columns (`x`) and rows (`y`).
@@ -19,7 +19,7 @@ pub(in crate::surface) struct Plan {
     pub(in crate::surface) cutoff: f64,
 }
 
-impl Plan {
+impl FitPlan {
     /// Knots at all nodes: the spline interpolates.
     pub(in crate::surface) fn every_node(frame: &GridFrame, degree: usize) -> Self {
         Self { degree, intervals: [frame.cols() - 1, frame.rows() - 1], cutoff: 0.0 }

@@ -19,39 +19,56 @@ pub struct Residuals {
 
 /// Residuals of a fit over the finite heights.
 pub(in crate::surface) fn residuals(frame: &GridFrame, fit: &Fit, heights: &[f64]) -> Residuals {
-    let rows: Vec<(f64, usize, f64, usize)> = heights
+    let rows: Vec<RowResiduals> = heights
         .par_chunks(frame.cols())
         .enumerate()
         .map_init(
             || vec![0.0; frame.cols()],
             |values, (row, heights)| {
                 fit.row_values(row, values);
-                let (mut sum, mut count, mut max, mut at) = (0.0, 0, 0.0, 0);
-                for (col, (value, z)) in values.iter().zip(heights).enumerate() {
-                    if z.is_finite() {
-                        let residual = (value - z).abs();
-                        sum += residual * residual;
-                        count += 1;
-                        if residual > max {
-                            (max, at) = (residual, col);
-                        }
-                    }
-                }
-                (sum, count, max, at)
+                RowResiduals::new(values, heights)
             },
         )
         .collect();
     // Added row by row, so that the sum does not depend on the number of threads.
-    let (mut sum, mut count) = (0.0, 0);
+    let (mut squares, mut count) = (0.0, 0);
     let mut residuals = Residuals::default();
-    for (row, &(squares, valid, max, col)) in rows.iter().enumerate() {
-        sum += squares;
-        count += valid;
-        if max > residuals.max {
-            residuals.max = max;
-            residuals.at = DVec2::new(col as f64, row as f64);
+    for (row, of_row) in rows.iter().enumerate() {
+        squares += of_row.squares;
+        count += of_row.count;
+        if of_row.max > residuals.max {
+            residuals.max = of_row.max;
+            residuals.at = DVec2::new(of_row.col as f64, row as f64);
         }
     }
-    residuals.rms = (sum / count as f64).sqrt();
+    residuals.rms = (squares / count as f64).sqrt();
     residuals
+}
+
+/// Residuals over the finite heights of a row.
+#[derive(Default)]
+struct RowResiduals {
+    /// Sum of their squares, m².
+    squares: f64,
+    count: usize,
+    /// Largest, m, and its column.
+    max: f64,
+    col: usize,
+}
+
+impl RowResiduals {
+    fn new(values: &[f64], heights: &[f64]) -> Self {
+        let mut row = Self::default();
+        for (col, (value, z)) in values.iter().zip(heights).enumerate() {
+            if z.is_finite() {
+                let residual = (value - z).abs();
+                row.squares += residual * residual;
+                row.count += 1;
+                if residual > row.max {
+                    (row.max, row.col) = (residual, col);
+                }
+            }
+        }
+        row
+    }
 }

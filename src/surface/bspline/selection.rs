@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::fit::Fit;
-use super::knots::Plan;
+use super::knots::FitPlan;
 use super::residuals::residuals;
 use super::voids::fill;
 use crate::control::Control;
@@ -23,9 +23,9 @@ pub(in crate::surface) fn fewest_knots(
     degree: usize,
     rms: f64,
     control: &Control,
-) -> Result<Plan> {
+) -> Result<FitPlan> {
     let quiet = control.quiet();
-    let filled = fill(frame, heights, &Plan::every_node(frame, degree), &quiet)?;
+    let filled = fill(frame, heights, &FitPlan::every_node(frame, degree), &quiet)?;
     // As many intervals as the finer cells fit along the longer side: knots at every node, which
     // interpolate, so the upper end always meets the tolerance.
     let cells = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
@@ -34,7 +34,7 @@ pub(in crate::surface) fn fewest_knots(
     let (mut few, mut enough) = (0, finest.ceil() as usize);
     while few < enough {
         let middle = few.midpoint(enough);
-        let plan = Plan::coarse(frame, degree, middle);
+        let plan = FitPlan::coarse(frame, degree, middle);
         let fit = Fit::new(frame, &filled, &plan, &quiet)?;
         if residuals(frame, &fit, heights).rms <= rms {
             enough = middle;
@@ -42,7 +42,7 @@ pub(in crate::surface) fn fewest_knots(
             few = middle + 1;
         }
     }
-    Ok(Plan::coarse(frame, degree, enough))
+    Ok(FitPlan::coarse(frame, degree, enough))
 }
 
 /// The cut-off in metres with the least [score](generalised_cross_validation): lengths by powers of two from 2 cells to half
@@ -56,9 +56,9 @@ pub(in crate::surface) fn cross_validate(
     let quiet = control.quiet();
     let (frame, heights) = window(frame, heights)?;
     let cell = mean_cell(&frame);
-    let filled = fill(&frame, &heights, &Plan::every_node(&frame, degree), &quiet)?;
+    let filled = fill(&frame, &heights, &FitPlan::every_node(&frame, degree), &quiet)?;
     let score = |log_cells: f64| {
-        let plan = Plan::smooth(&frame, degree, log_cells.exp2() * cell);
+        let plan = FitPlan::smooth(&frame, degree, log_cells.exp2() * cell);
         generalised_cross_validation(&frame, &heights, &filled, &plan, &quiet)
     };
     let longest = (frame.cols().max(frame.rows()) as f64 / 2.0).log2().max(2.0) as usize;
@@ -85,7 +85,7 @@ fn generalised_cross_validation(
     frame: &GridFrame,
     heights: &[f64],
     filled: &[f64],
-    plan: &Plan,
+    plan: &FitPlan,
     control: &Control,
 ) -> Result<f64> {
     let fit = Fit::new(frame, filled, plan, control)?;

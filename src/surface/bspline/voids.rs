@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::banded::Banded;
 use super::fit::{Axis, Fit, LANES, stripes};
-use super::knots::Plan;
+use super::knots::FitPlan;
 use crate::control::Control;
 use crate::error::Result;
 use crate::grid::GridFrame;
@@ -20,7 +20,7 @@ use crate::grid::GridFrame;
 const ROUNDS: usize = 2;
 
 /// Refitting ends once no void moves by more than this share of the range of heights.
-const SETTLED: f64 = 1e-7;
+const CONVERGED: f64 = 1e-7;
 
 /// Shortest cut-off of the first guess, in cells: it must see past single noisy heights. Interpolating
 /// SRTM with holes, the error of the curvature beside them is 4.5, 3.4 and 4.4 /km for 2, 4 and 8 cells.
@@ -33,7 +33,7 @@ const REACH: f64 = 4.0;
 pub(in crate::surface) fn fit_finite(
     frame: &GridFrame,
     heights: &[f64],
-    plan: &Plan,
+    plan: &FitPlan,
     control: &Control,
 ) -> Result<Fit> {
     if heights.par_iter().all(|z| z.is_finite()) {
@@ -44,7 +44,7 @@ pub(in crate::surface) fn fit_finite(
     for _ in 0..ROUNDS {
         let fit = Fit::new(frame, &filled, plan, control)?;
         let moved = refill(frame, &fit, heights, &mut filled);
-        if moved <= SETTLED * (high - low) {
+        if moved <= CONVERGED * (high - low) {
             break;
         }
     }
@@ -55,7 +55,7 @@ pub(in crate::surface) fn fit_finite(
 pub(in crate::surface) fn fill(
     frame: &GridFrame,
     heights: &[f64],
-    plan: &Plan,
+    plan: &FitPlan,
     control: &Control,
 ) -> Result<Vec<f64>> {
     let [low, high] = range(heights);
@@ -76,7 +76,7 @@ pub(in crate::surface) fn fill(
 fn fill_once(
     frame: &GridFrame,
     heights: &[f64],
-    plan: &Plan,
+    plan: &FitPlan,
     control: &Control,
 ) -> Result<Vec<f64>> {
     let cells = |spacing: f64| (plan.cutoff / spacing).max(SHORTEST_CUTOFF);

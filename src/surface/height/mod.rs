@@ -10,7 +10,7 @@ use rayon::prelude::*;
 pub use self::options::{Degree, FitOptions, Smoothing};
 use super::bspline::block::{BLOCK, HeightBlock};
 use super::bspline::fit::Fit;
-use super::bspline::knots::Plan;
+use super::bspline::knots::FitPlan;
 use super::bspline::residuals::{Residuals, residuals};
 use super::bspline::selection::{cross_validate, fewest_knots, mean_cell};
 use super::bspline::voids::fit_finite;
@@ -72,11 +72,11 @@ impl HeightSurface {
         let cell = mean_cell(&frame);
         let degree = options.degree.number();
         let plan = match options.smoothing {
-            Smoothing::Interpolate => Plan::every_node(&frame, degree),
-            Smoothing::Cutoff(length) => Plan::smooth(&frame, degree, length),
-            Smoothing::CutoffCells(cells) => Plan::smooth(&frame, degree, cells * cell),
+            Smoothing::Interpolate => FitPlan::every_node(&frame, degree),
+            Smoothing::Cutoff(length) => FitPlan::smooth(&frame, degree, length),
+            Smoothing::CutoffCells(cells) => FitPlan::smooth(&frame, degree, cells * cell),
             Smoothing::Auto => {
-                Plan::smooth(&frame, degree, cross_validate(&frame, heights, degree, control)?)
+                FitPlan::smooth(&frame, degree, cross_validate(&frame, heights, degree, control)?)
             }
             Smoothing::Tolerance(rms) => fewest_knots(&frame, heights, degree, rms, control)?,
         };

@@ -90,16 +90,17 @@ impl NurbsCurve {
     /// The derivative by the parameter.
     #[must_use]
     pub fn tangent(&self, u: f64) -> DVec3 {
-        let (p, slope) = (self.sum(u, 0), self.sum(u, 1));
+        let (p, slope) = (self.homogeneous_at(u), self.derivative(u, 1));
         (slope.xyz() - slope.w * p.xyz() / p.w) / p.w
     }
 
+    /// `(w x, w y, w z, w)`.
     fn homogeneous_at(&self, u: f64) -> DVec4 {
-        self.sum(u, 0)
+        self.derivative(u, 0)
     }
 
     /// `k`-th derivative of `(w x, w y, w z, w)`.
-    fn sum(&self, u: f64, k: usize) -> DVec4 {
+    fn derivative(&self, u: f64, k: usize) -> DVec4 {
         let basis = self.knots.basis(u);
         (0..=self.knots.degree()).map(|i| basis.of[i][k] * self.net[basis.first + i]).sum()
     }
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_curves_are_told() {
+    fn wrong_curves_are_refused() {
         assert!(NurbsCurve::through(&[DVec3::ZERO], 1).is_err());
         assert!(NurbsCurve::through(&[DVec3::ZERO; 4], 3).is_err());
         assert!(NurbsCurve::through(&[DVec3::X, DVec3::NAN], 1).is_err());

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_files_are_told() {
+    fn wrong_files_are_refused() {
         for (from, to, said) in [
             ("[0, 0, 1, 1], [", "[0, 1, 0, 1], [", "ascend"),
             ("[0, 0, 1, 1], [", "[0, 0, 1], [", "4 or more"),

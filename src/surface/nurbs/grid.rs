@@ -25,12 +25,12 @@ pub struct NurbsGrid {
     columns: Vec<Basis>,
 }
 
-/// How far inside the jet of a pole is taken, in cells. At ten times as far, distances from a pole are wrong by the length of that ring: on
+/// How far from a pole its jet is taken, in cells. At ten times as far, distances from a pole are wrong by the length of that ring: on
 /// a sphere of 200 rows 1.3 and, at high accuracy, 10 times as much. The tensor there is as extreme as `f32` can take on
 /// grids of up to some 100 000 columns.
-const INSIDE: f64 = 0.001;
+const POLE_INSET: f64 = 0.001;
 /// The most nodes along a direction.
-const MOST: usize = 100_000;
+const MAX_NODES: usize = 100_000;
 
 impl NurbsSurface {
     /// The surface with `cols` nodes along its first and `rows` along its second parameter.
@@ -42,23 +42,23 @@ impl NurbsSurface {
         let mut bounds = [[0.0; 2]; 2];
         for axis in [0, 1] {
             let least = if self.closed[axis] { 3 } else { 2 };
-            if !(least..=MOST).contains(&nodes[axis]) {
+            if !(least..=MAX_NODES).contains(&nodes[axis]) {
                 return Err(Error::argument(
                     format!(
                         "the number of nodes in the {} direction of the surface",
                         ["first", "second"][axis]
                     ),
                     nodes[axis],
-                    format!("between {least} and {MOST}"),
+                    format!("between {least} and {MAX_NODES}"),
                 ));
             }
             let [first, last] = self.edges(axis).map(|edge| size(&edge) <= SMALL * self.size());
-            let inside = |is_pole: bool| if is_pole { INSIDE } else { 0.0 };
+            let inside = |is_pole: bool| if is_pole { POLE_INSET } else { 0.0 };
             bounds[axis] = [inside(first), (nodes[axis] - 1) as f64 - inside(last)];
         }
         let mut grid = NurbsGrid { surface: self, nodes, bounds, columns: Vec::new() };
         let surface = &grid.surface;
-        let basis = |u: f64| surface.knots[0].basis(surface.turned(0, u));
+        let basis = |u: f64| surface.knots[0].basis(surface.wrapped(0, u));
         grid.columns = (0..cols).map(|col| basis(grid.parameter(0, col as f64))).collect();
         Ok(grid)
     }

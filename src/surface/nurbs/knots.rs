@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// Degree and knots `u_0 ≤ u_1 ≤ …` of B-splines `N_i`, one for each control point; `N_i` lives on `u_i … u_{i+p+1}`.
+/// Degree and knots `u_0 ≤ u_1 ≤ …` of B-splines `N_i`, one for each control point; `N_i` is 0 outside `u_i … u_{i+p+1}`.
 ///
 /// Invariants: the degree `p` is 1 to [`MAX_DEGREE`](Self::MAX_DEGREE); there are `p + 1` control points or more; the knots are
 /// finite and ascend; inside the [domain](Self::domain) none comes more than `p` times, anywhere none more than `p + 1`
@@ -28,6 +28,8 @@ impl Knots {
     /// The most control points, of a surface too.
     pub const MAX_CONTROLS: usize = 1_000_000;
 
+    /// The knots of splines of a degree.
+    ///
     /// # Errors
     /// [`Error::Argument`] that says which invariant does not hold.
     pub fn new(degree: usize, knots: Vec<f64>) -> Result<Self> {
@@ -73,12 +75,11 @@ impl Knots {
             )
             .advise("make them equal or move them apart"));
         }
-        let often = |u: f64| knots.multiplicity(u);
         let most = |u: f64| if from < u && u < to { degree } else { degree + 1 };
-        if let Some(&u) = knots.knots.iter().find(|&&u| often(u) > most(u)) {
+        if let Some(&u) = knots.knots.iter().find(|&&u| knots.multiplicity(u) > most(u)) {
             return Err(Error::argument(
                 format!("the multiplicity of the knot {u}"),
-                often(u),
+                knots.multiplicity(u),
                 format!("at most {} at degree {degree}", most(u)),
             ));
         }
@@ -102,7 +103,7 @@ impl Knots {
         Self::clamped_at(degree, inner)
     }
 
-    /// Knots over 0 to 1, full at both ends, with these between.
+    /// Clamped knots over 0 to 1, with these between the ends.
     pub(super) fn clamped_at(degree: usize, inner: impl Iterator<Item = f64>) -> Result<Self> {
         let end = |u: f64| std::iter::repeat_n(u, degree.min(Self::MAX_DEGREE) + 1);
         Self::new(degree, end(0.0).chain(inner).chain(end(1.0)).collect())
@@ -137,7 +138,7 @@ impl Knots {
         self.knots.partition_point(|&knot| knot <= u) - self.knots.partition_point(|&knot| knot < u)
     }
 
-    /// The stretches of the domain between different knots.
+    /// The intervals of the domain between different knots.
     pub(super) fn spans(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let spans = self.knots[self.degree..=self.controls()].windows(2);
         spans.filter(|ends| ends[0] < ends[1]).map(|ends| [ends[0], ends[1]])
@@ -188,7 +189,7 @@ impl Knots {
     /// The NURBS Book, equation 5.15).
     ///
     /// # Errors
-    /// A `u` that is not inside the domain or is a knot as often as possible already.
+    /// A `u` that is not inside the domain or is a knot of full multiplicity already.
     pub(super) fn inserted(&self, u: f64) -> Result<(Self, Vec<f64>)> {
         let [from, to] = self.domain();
         if !(from < u && u < to) {
@@ -247,7 +248,7 @@ impl Knots {
     }
 }
 
-/// Different knots are farther apart than this share of the domain: derivatives over such stretches are noise.
+/// Different knots are farther apart than this share of the domain: derivatives over shorter intervals are noise.
 const NARROWEST: f64 = 1e-9;
 
 #[cfg(test)]
@@ -288,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_knots_are_told() {
+    fn wrong_knots_are_refused() {
         for (degree, knots, said) in [
             (0, vec![0.0, 1.0], "degree of a spline is 0"),
             (99, vec![0.0; 300], "is 99"),

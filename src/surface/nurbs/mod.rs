@@ -3,10 +3,9 @@
 //! [`NurbsSurface`] is the map and its exact derivatives, `knots` the splines of one parameter, `curve` profiles, sections and
 //! trajectories, `shapes` surfaces made of them, `file` the JSON form, [`NurbsGrid`] a surface with nodes.
 //!
-//! Ours, and not a crate's: directions that close, poles, Möbius maps and input that is checked before it is believed are most of
-//! what is here beside the few lines that evaluate. truck-geometry has none of these and evaluates each derivative by itself;
-//! curvo, the fullest, takes nets and knots that do not fit together, allocates at every point, and brings an optimiser and a
-//! mesh kernel along.
+//! No crate is used for them: the evaluation is a few lines, and most of what is here are closed directions, poles, Möbius maps and
+//! the checks of input. truck-geometry has none of these and evaluates each derivative by itself; curvo, the most complete, accepts
+//! control points and knots that do not fit together, allocates at every point, and depends on an optimiser and a mesh kernel.
 
 mod curve;
 mod file;
@@ -29,8 +28,8 @@ use crate::error::{Error, Result};
 ///   S(u) = Σ_ij N_i(u1) N_j(u2) w_ij P_ij / Σ_ij N_i(u1) N_j(u2) w_ij ,     control points P_ij, weights w_ij > 0.
 /// ```
 ///
-/// Where a direction is *closed*, the surface ends where it began, and its parameter goes round: one beyond the domain is a turn
-/// away from one in it. Any knots may be used for that, also those with a full end; where the derivatives do not match across
+/// Where a direction is *closed*, the surface ends where it began, and its parameter is periodic: one beyond the domain stands for
+/// the one in it that differs by whole periods. Any knots may be used for that, clamped ones too; where the derivatives do not match across
 /// the seam, the surface has a crease there or at least its parameters have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NurbsSurface {
@@ -113,7 +112,7 @@ impl NurbsSurface {
     /// In a direction that is not closed, a parameter is moved into the domain.
     #[must_use]
     pub fn jet(&self, u: DVec2) -> SurfaceJet {
-        let [u1, u2] = [0, 1].map(|axis| self.knots[axis].basis(self.turned(axis, u[axis])));
+        let [u1, u2] = [0, 1].map(|axis| self.knots[axis].basis(self.wrapped(axis, u[axis])));
         let first = u1.first;
         self.jet_on(&u1, &self.line(&u2, first..first + self.knots[0].degree() + 1))
     }
@@ -127,12 +126,12 @@ impl NurbsSurface {
         let least = columns.iter().map(|basis| basis.first).min().unwrap_or(0);
         let most = columns.iter().map(|basis| basis.first).max().unwrap_or(0);
         let controls = least..most + self.knots[0].degree() + 1;
-        let line = self.line(&self.knots[1].basis(self.turned(1, u2)), controls);
+        let line = self.line(&self.knots[1].basis(self.wrapped(1, u2)), controls);
         columns.iter().map(move |basis| self.jet_on(basis, &line[basis.first - least..]))
     }
 
-    /// In a closed direction the same parameter in the domain.
-    fn turned(&self, axis: usize, u: f64) -> f64 {
+    /// In a closed direction the parameter in the domain that stands for `u`.
+    fn wrapped(&self, axis: usize, u: f64) -> f64 {
         let [from, to] = self.knots[axis].domain();
         if self.closed[axis] { from + (u - from).rem_euclid(to - from) } else { u }
     }
@@ -178,7 +177,7 @@ impl NurbsSurface {
     /// The same surface with one more knot, at `u`, in a direction (0 or 1).
     ///
     /// # Errors
-    /// A `u` that is not inside the domain or is a knot as often as possible already.
+    /// A `u` that is not inside the domain or is a knot of full multiplicity already.
     ///
     /// # Panics
     /// If the direction is not 0 or 1.
@@ -249,10 +248,12 @@ impl NurbsSurface {
         jet.is_regular() && a * by.x > least && b * by.y > least
     }
 
+    /// Refuses a surface with a patch between knots that has no area.
+    ///
     /// # Errors
-    /// A patch between knots without area.
+    /// There is one.
     fn check_patches(&self) -> Result<()> {
-        /// Shares of a patch at which it is looked at.
+        /// Where in a patch its area is looked at, as shares of its sides.
         const PLACES: [f64; 3] = [0.5, 0.2, 0.8];
         let least = SMALL * self.size();
         for [from2, to2] in self.knots[1].spans() {
@@ -292,8 +293,10 @@ fn homogeneous(points: &[DVec4]) -> Result<Vec<DVec4>> {
     Ok(net)
 }
 
+/// Refuses weights out of range.
+///
 /// # Errors
-/// A weight out of range.
+/// There is one.
 fn check_weights(net: &[DVec4]) -> Result<()> {
     match net.iter().position(|p| !(LIGHTEST..=LIGHTEST.recip()).contains(&p.w)) {
         Some(i) => Err(Error::argument(
