@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 /// Makes the enumeration of the kinds, each with the [`Shape`] that its file holds.
 macro_rules! kinds {
     ($($(#[$doc:meta])* $kind:ident = $file:ident::$shape:ident,)*) => {
-        /// The shapes there are. `h` is the relief, `a` half the longer side, both in metres.
+        /// The kinds of synthetic terrain. `h` is the relief, `a` half the longer side, both in metres.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum SyntheticKind {
             $($(#[$doc])* $kind,)*

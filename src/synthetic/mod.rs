@@ -32,7 +32,7 @@ mod round;
 mod scalar;
 mod shape;
 mod switchbacks;
-#[expect(clippy::module_inception, reason = "the folder is called by what it makes")]
+#[expect(clippy::module_inception, reason = "the folder is named after its main type")]
 mod synthetic;
 
 pub use self::kind::SyntheticKind;

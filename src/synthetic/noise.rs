@@ -62,7 +62,7 @@ pub(super) fn ridged<T: Scalar>(seed: u64, octaves: u32, mut x: T, mut y: T) -> 
         let distance = (n * n + ROUNDING * ROUNDING).sqrt() - ROUNDING;
         weight = weight * (distance * -STEEPNESS).exp() * if octave == 0 { 1.0 } else { 0.5 };
         sum = sum + weight;
-        // Half the wavelength; turned (3-4-5 triangle) and shifted to hide the lattice.
+        // Half the wavelength; rotated (3-4-5 triangle) and shifted to hide the lattice.
         (x, y) = (x * 1.6 - y * 1.2 + 0.37, x * 1.2 + y * 1.6 + 0.71);
     }
     sum

@@ -17,13 +17,14 @@ pub(super) struct Shape {
     pub(super) jet: fn(&Parameters, Jet, Jet) -> Jet,
 }
 
-/// What a formula is made for.
+/// The numbers that a formula depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Parameters {
     /// `a`, half the longer side, in metres.
     pub(super) half_extent: f64,
     /// `h`, in metres.
     pub(super) relief: f64,
+    /// Stream of the random numbers.
     pub(super) seed: u64,
     /// Octaves of noise that the grid can show.
     pub(super) octaves: u32,

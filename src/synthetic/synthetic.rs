@@ -67,7 +67,7 @@ impl Synthetic {
         Ok(Self { parameters: Parameters { relief, ..self.parameters }, ..self })
     }
 
-    /// The shape.
+    /// The kind of terrain.
     #[must_use]
     pub fn kind(&self) -> SyntheticKind {
         self.kind
@@ -154,7 +154,7 @@ mod tests {
     use crate::synthetic::noise::hash;
 
     #[test]
-    fn who_cancels_gets_no_terrain() {
+    fn cancelling_gives_no_terrain() {
         let range = Synthetic::new(SyntheticKind::Range, 9, 9, 30.0).unwrap();
         let control = Control::default();
         control.cancel.cancel();
@@ -311,7 +311,7 @@ mod tests {
         }
     }
 
-    /// The hash of all kinds, computed once: the terrains of tomorrow are those of today.
+    /// The hash of all kinds, computed once: a change of any bit of any height shows.
     #[test]
     fn heights_keep_their_bits() {
         let digest = all(61, 47, 10.0)
@@ -322,7 +322,7 @@ mod tests {
 
     /// Walking along a bench is gentle, straight up is steep.
     #[test]
-    fn switchbacks_offer_a_gentle_way() {
+    fn switchbacks_offer_a_gentle_path() {
         let side = Synthetic::new(SyntheticKind::Switchbacks, 201, 201, 10.0).unwrap();
         // The second bench, where φ = 5π/2 and sin φ = 1, lies along t = 1/2: y = 0, and climbs east.
         let grade = (side.height(900.0, 0.0) - side.height(-900.0, 0.0)) / 1800.0;

@@ -42,7 +42,7 @@ impl Georeference {
 
     /// Grid coordinates of a longitude and latitude in degrees, inside the grid or not; see [`Crs::from_lonlat`].
     ///
-    /// Where the grid is one of longitudes, the turn nearest to its middle is taken, so that 179.9° E and
+    /// On a grid of longitudes, the longitude is shifted by multiples of 360° to be nearest to its middle, so that 179.9° E and
     /// 179.9° W are neighbours on a grid across the date line.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! A file becomes heights in metres on a frame.
+//! Terrains: files are read into heights in metres on a grid.
 //!
 //! ```text
 //! file ──▶ a format is recognised ──▶ raster ──▶ terrain: metres, NaN for voids, row 0 in the north
@@ -8,14 +8,14 @@
 //! [`Terrain::open`] reads heights, [`read_bands`] any other raster. A [`Georeference`] says where the nodes lie on
 //! the map and on the Earth.
 //!
-//! A new format is one file in `formats/` and one line in the list there.
+//! A new format is one file in `formats/` and one line in the list of `formats/mod.rs`.
 
 mod bands;
 mod crs;
 mod formats;
 mod georeference;
 mod raster;
-#[expect(clippy::module_inception, reason = "the folder is called by what it makes")]
+#[expect(clippy::module_inception, reason = "the folder is named after its main type")]
 mod terrain;
 
 pub use self::bands::{RasterBands, read_bands};

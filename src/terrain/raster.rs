@@ -1,4 +1,4 @@
-//! What a reader hands over.
+//! A raster as the reader of a format returns it.
 
 use std::path::Path;
 
@@ -9,12 +9,12 @@ use super::Crs;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
 
-/// Infinite cells carry no value either.
+/// Makes infinite cells voids too.
 pub(super) fn void_infinite(values: &mut [f64]) {
     values.par_iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
 }
 
-/// What the file said of itself, for `info`.
+/// What a file says of itself: its format, and how it stores heights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
     /// Name of the format, such as `GeoTIFF` or `ESRI ASCII grid`.
@@ -45,7 +45,7 @@ impl Default for Source {
     }
 }
 
-/// What a reader hands over: values as stored (scaled, not yet in metres), rows in the file's order.
+/// A raster as the reader of a format returns it: values as stored (scaled, not yet in metres), rows in the file's order.
 #[derive(Debug)]
 pub(super) struct Raster {
     pub(super) cols: usize,
@@ -87,8 +87,8 @@ impl Raster {
             .map_err(|e| e.in_file(path))
     }
 
-    /// Without a CRS, coordinates that look like degrees are taken for degrees: as metres they would make
-    /// every slope a wall.
+    /// Without a CRS, coordinates that look like degrees are taken for degrees: taken for metres, every
+    /// slope would be almost vertical.
     fn guess_crs(&mut self) {
         let note = match Crs::from_epsg(4326) {
             Ok(wgs84) if self.looks_like_degrees() => {

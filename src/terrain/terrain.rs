@@ -46,7 +46,7 @@ impl Terrain {
         })
     }
 
-    /// Reads a DEM. The format is told by content first, by extension second.
+    /// Reads a DEM. The format is recognised by content first, by extension second.
     ///
     /// # Errors
     /// [`Error::Format`], [`Error::Unsupported`], [`Error::TooLarge`] or [`Error::Io`]: a file that is damaged, of a kind that
@@ -99,7 +99,7 @@ impl Terrain {
         &self.notes
     }
 
-    /// What the file said of itself.
+    /// What the file says of itself.
     #[must_use]
     pub fn source(&self) -> &Source {
         &self.source
@@ -141,7 +141,7 @@ impl Terrain {
         self.georeference.from_lonlat(lonlat)
     }
 
-    /// Says so if no terrain has such heights.
+    /// A note if no terrain has such heights.
     fn note_of_heights(&self) -> Option<String> {
         /// No body of the solar system has ground this many metres from its datum.
         const HIGHEST: f64 = 1e5;
@@ -154,7 +154,7 @@ impl Terrain {
         }
     }
 
-    /// Says so if lengths on the map, which distances are measured in, are not those on the ground.
+    /// A note if lengths on the map, in which distances are measured, are not those on the ground.
     fn note_of_distortion(&self) -> Option<String> {
         const NOTABLE: f64 = 0.01;
         let [least, most] = self.georeference.ground_per_map_metre()?;

@@ -83,7 +83,7 @@ impl Crs {
         let (name, wkt) = (wkt_name(definition.wkt), definition.wkt);
         let mut crs = match (Self::from_proj(definition.proj4, name), wkt_unit(wkt)) {
             (Ok(crs), _) => crs,
-            // A projection that is not at hand: no way to longitude and latitude, but distances are right.
+            // A projection that `proj4rs` lacks: no way to longitude and latitude, but distances are right.
             (Err(_), Some((unit, size))) if wkt.starts_with("PROJCS") => {
                 Self::named(name, unit, size)
             }
@@ -123,7 +123,7 @@ impl Crs {
             let metres_per_unit = proj.to_meter();
             (Ground::Plane { metres_per_unit }, unit_name(metres_per_unit))
         };
-        // South-African "Lo" grids count west and south; which way their files do is anyone's guess.
+        // South-African "Lo" grids count west and south; in which direction a given file counts is not known.
         let known = proj.is_normalized_axis();
         let projection = known.then(|| Arc::new(Projection { definition, proj }));
         Ok(Self { epsg: None, name: name.to_owned(), unit, ground, projection, caveat, keys: None })
@@ -255,7 +255,7 @@ impl Crs {
     }
 }
 
-/// Through `proj4rs`, which takes radians for degrees; `None` where the projection has no answer.
+/// A point in another projection, by `proj4rs`: longitudes and latitudes in radians; `None` where the projection has no answer.
 fn transform(from: &Proj, to: &Proj, point: DVec2) -> Option<DVec2> {
     let (x, y) = transform_xy(from, to, point.x, point.y).ok()?;
     let result = DVec2::new(x, y);
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_stretch_the_ground() {
+    fn maps_distort_lengths() {
         let size = |code: u32, map: DVec2| Crs::from_epsg(code).unwrap().ground_per_map_metre(map);
         // The scale of UTM on its central meridian is 0.9996.
         let utm = size(32631, DVec2::new(500_000.0, 5e6)).unwrap();

@@ -1,6 +1,6 @@
-//! Datum shifts in the place of grid files that are not at hand.
+//! Mean datum shifts in place of shift grids, which are not included.
 
-/// Puts mean datum shifts in the place of grid files that are not at hand, and says what that costs.
+/// The PROJ.4 definition with shift grids replaced by mean datum shifts, and a caveat that says how far off they are.
 pub(super) fn without_shift_grids(definition: &str) -> (String, Option<String>) {
     /// What to replace, by what, and the caveat. NAD27: EPSG transformation 1173. NZGD49: the
     /// definitions give a seven-parameter shift besides the grid.

@@ -1,7 +1,7 @@
 //! ESRI ASCII grids (`.asc`): a header of keywords, then numbers from the north-west on.
 //!
 //! Accepted beyond the specification: keywords in any case and order, `dx` and `dy` for cells that are not
-//! square (as GDAL writes), lines broken anywhere, decimal commas, `nan`, a byte order mark, a `.prj` beside.
+//! square (as GDAL writes), lines broken anywhere, decimal commas, `nan`, a byte order mark, a `.prj` file beside.
 
 use std::fs;
 use std::path::Path;
@@ -49,7 +49,7 @@ fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
     })
 }
 
-/// The header, what it comes to, and the cells.
+/// The header, the grid it describes, and the cells.
 fn parse(bytes: &[u8]) -> Result<(Header, Grid, Vec<f64>)> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut tokens = bytes.split(u8::is_ascii_whitespace).filter(|t| !t.is_empty()).peekable();
@@ -69,7 +69,7 @@ fn parse(bytes: &[u8]) -> Result<(Header, Grid, Vec<f64>)> {
     Ok((header, grid, heights))
 }
 
-/// A word of the file as far as a message has room.
+/// A word of the file in quotes, cut to a length that fits in a message.
 fn quoted(token: &[u8]) -> String {
     format!("`{}`", String::from_utf8_lossy(&token[..token.len().min(40)]))
 }
@@ -138,7 +138,7 @@ impl Header {
         Ok(())
     }
 
-    /// Bounds the number of cells by the size of the file, so that none is allocated for which there is no byte.
+    /// The grid that the header describes. Bounds the number of cells by the size of the file, so that none is allocated for which there is no byte.
     fn check(&self, bytes: usize) -> Result<Grid> {
         let cols = count(self.cols, "ncols")?;
         let rows = count(self.rows, "nrows")?;
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_say_what_and_where() {
+    fn errors_say_what_and_where() {
         for (text, words) in [
             (format!("{HEADER}1 2 3 4 five 6"), "the height at column 1, row 1 is `five`"),
             (format!("{HEADER}1 2 3 4 5"), "is 5; it must be 6, that of 3 × 2"),

@@ -1,4 +1,4 @@
-//! Files that are no DEM, or one of a format that is not read: known well enough to say what to do with them.
+//! Files that are recognised but not read, and what to do with them.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 
 const CONVERT: &str = "convert it with `gdal_translate IN OUT.tif`";
 
-/// Beginning of a file, what it is, and what to do with it.
+/// The first bytes of a file, what it is, and what to do with it.
 const MAGIC: [(&[u8], &str, &str); 11] = [
     (b"\x1f\x8b", "a gzip file", "unpack it with `gunzip`"),
     (b"PK\x03\x04", "a zip archive", "unpack it first"),
@@ -22,11 +22,11 @@ const MAGIC: [(&[u8], &str, &str); 11] = [
     (b"\x93NUMPY", "a NumPy array, not read yet", "write it as a GeoTIFF"),
 ];
 
-/// Extensions of DEMs that cannot be told by their content.
+/// Extensions of DEMs that cannot be recognised by their content.
 const EXTENSIONS: [&str; 7] = ["flt", "bil", "bip", "bsq", "xyz", "csv", "dem"];
 
-/// Refuses what stands in the place of a file that was to be fetched.
-pub(super) fn refuse_stand_in(path: &Path, head: &Head) -> Result<()> {
+/// Refuses what failed downloads leave: an HTML page, a Git LFS pointer.
+pub(super) fn refuse_failed_download(path: &Path, head: &Head) -> Result<()> {
     let begins = |start: &str| head.text.starts_with(start);
     if begins("<!doctype html") || begins("<html") {
         let page = Error::argument("the file", "an HTML page", "a DEM");

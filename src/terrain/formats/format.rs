@@ -1,4 +1,4 @@
-//! What a format is, and what it is told by.
+//! What a format is, and what it is recognised by.
 
 use std::path::Path;
 
@@ -13,7 +13,8 @@ pub(super) struct Format {
     pub(super) is_own: fn(&Head) -> bool,
     /// Lower-case extensions of files that are taken for this format where nothing else is known of them.
     pub(super) extensions: &'static [&'static str],
-    /// Reads a file whose content is given; the path is for messages, for files beside, and where the name says the place.
+    /// Reads a file whose content is given; the path serves messages, files beside it, and formats whose
+    /// file names give the place.
     pub(super) read: fn(&Path, &[u8], ReadMode) -> Result<Raster>,
 }
 
@@ -26,8 +27,9 @@ pub(crate) enum ReadMode {
     Bands,
 }
 
-/// What a format is told by: the beginning of a file and its name.
+/// What a format is recognised by: the beginning of a file and its name.
 pub(super) struct Head<'a> {
+    /// The first [`LENGTH`](Self::LENGTH) bytes, or all if there are fewer.
     pub(super) bytes: &'a [u8],
     /// The same as lower-case text, without what may stand before the first word.
     pub(super) text: String,

@@ -76,7 +76,7 @@ fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
     })
 }
 
-/// Says what is taken for granted of the heights.
+/// Notes what is assumed of the heights.
 fn note_assumptions(layout: &Layout, has_unit: bool, crs: &Crs, notes: &mut Vec<String>) {
     if layout.bands > 1 {
         let bands = layout.bands;
@@ -203,7 +203,7 @@ fn placement(image: &Directory, is_point: bool) -> TiffResult<Option<Placement>>
     let half = if is_point { 0.0 } else { 0.5 };
     let matrix = image.doubles(tag::MODEL_TRANSFORMATION)?;
     if let [a, b, _, x, d, e, _, y, ..] = matrix[..] {
-        // Rounding in the writer leaves dust; a real rotation moves the far corner by much more.
+        // Rounding in the writer leaves tiny entries; a real rotation moves the far corner by much more.
         if b.abs() > 1e-9 * e.abs() || d.abs() > 1e-9 * a.abs() {
             return rotated();
         }
@@ -246,7 +246,7 @@ fn world_file(path: &Path) -> TiffResult<Option<Placement>> {
     }
 }
 
-/// Cells that a thread looks at in one go.
+/// Cells that a thread takes at a time.
 const PART: usize = 1 << 14;
 
 /// Turns nodata, infinite and masked cells to `NaN`, and notes what looks like nodata but is not declared.
@@ -265,18 +265,11 @@ fn void_nodata(
             None
         }
     });
-    // An absent part of the mask is `NaN`, and not valid.
-    let masked = |i: usize| mask.is_some_and(|mask| mask[i] == 0.0 || mask[i].is_nan());
-    let clean = |(part, values): (usize, &mut [f64])| {
-        for (i, value) in values.iter_mut().enumerate() {
-            if Some(*value) == nodata || value.is_infinite() || masked(part * PART + i) {
-                *value = f64::NAN;
-            }
-        }
-        values.iter().fold(f64::INFINITY, |low, &v| if v < low { v } else { low })
-    };
-    let lowest =
-        values.par_chunks_mut(PART).enumerate().map(clean).reduce(|| f64::INFINITY, f64::min);
+    let lowest = values
+        .par_chunks_mut(PART)
+        .enumerate()
+        .map(|(part, values)| void_part(values, part * PART, nodata, mask))
+        .reduce(|| f64::INFINITY, f64::min);
     // Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
     if lowest < -12_000.0 || lowest == -9999.0 {
         notes.push(format!(
@@ -284,6 +277,18 @@ fn void_nodata(
              declare it with `gdal_edit.py -a_nodata {lowest}`"
         ));
     }
+}
+
+/// Turns nodata, infinite and masked cells of a part, which begins at cell `first`, to `NaN`; the lowest of the others.
+fn void_part(values: &mut [f64], first: usize, nodata: Option<f64>, mask: Option<&[f64]>) -> f64 {
+    // An absent part of the mask is `NaN`, and not valid.
+    let masked = |i: usize| mask.is_some_and(|mask| mask[i] == 0.0 || mask[i].is_nan());
+    for (i, value) in values.iter_mut().enumerate() {
+        if Some(*value) == nodata || value.is_infinite() || masked(first + i) {
+            *value = f64::NAN;
+        }
+    }
+    values.iter().fold(f64::INFINITY, |low, &v| if v < low { v } else { low })
 }
 
 /// Validity of each cell from an internal mask of the same size: 1 where valid.
@@ -310,16 +315,19 @@ fn metadata_item<'a>(metadata: &'a str, role: &str, band: usize) -> Option<&'a s
     })
 }
 
-/// What the stored number `v` stands for: `scale · v + offset`.
+/// The number with a role in `GDAL_METADATA`, for one band; `None` if there is no such item.
+fn metadata_number(metadata: &str, role: &str, band: usize) -> TiffResult<Option<f64>> {
+    let Some(text) = metadata_item(metadata, role, band) else { return Ok(None) };
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(Some(value)),
+        _ => damaged(format!("the {role} in GDAL_METADATA"), format!("`{text}`"), "a number"),
+    }
+}
+
+/// Turns stored numbers `v` into what they stand for: `scale · v + offset`.
 fn scale(values: &mut [f64], metadata: &str, band: usize) -> TiffResult<()> {
-    let number = |role, default| match metadata_item(metadata, role, band) {
-        None => Ok(default),
-        Some(text) => match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => damaged(format!("the {role} in GDAL_METADATA"), format!("`{text}`"), "a number"),
-        },
-    };
-    let (scale, offset) = (number("scale", 1.0)?, number("offset", 0.0)?);
+    let scale = metadata_number(metadata, "scale", band)?.unwrap_or(1.0);
+    let offset = metadata_number(metadata, "offset", band)?.unwrap_or(0.0);
     if (scale, offset) != (1.0, 0.0) {
         values.par_iter_mut().for_each(|v| *v = scale * *v + offset);
     }
@@ -354,6 +362,7 @@ fn height_unit(keys: &GeoKeys, metadata: &str) -> TiffResult<Option<(&'static st
     }))
 }
 
+/// Name and metres of the unit that a file calls `name`.
 fn named_unit(name: &str) -> Option<(&'static str, f64)> {
     let name = name.to_ascii_lowercase().replace(['_', '-'], " ");
     let name = name.trim();

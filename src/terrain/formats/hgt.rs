@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_tell_the_place() {
+    fn names_give_the_place() {
         let at = |name: &str| south_west_corner(Path::new(name));
         assert_eq!(at("dir/N42E001.hgt"), Some(DVec2::new(1.0, 42.0)));
         assert_eq!(at("s01w002.SRTMGL1.hgt.zip"), Some(DVec2::new(-2.0, -1.0)));

@@ -18,13 +18,13 @@ use self::format::{Format, Head};
 use super::raster::Raster;
 use crate::error::{Error, Result};
 
-/// All formats, in the order in which a file is offered to them: those that know their own beyond doubt first.
+/// All formats, in the order in which they are asked for a file: those that recognise theirs beyond doubt first.
 const FORMATS: [Format; 3] = [geotiff::FORMAT, ascii_grid::FORMAT, hgt::FORMAT];
 
 /// Reads a file of any of the formats.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::TooLarge`]; what the reader of the format has to say; [`Error::Format`] or
+/// [`Error::Io`]; [`Error::TooLarge`]; the errors of the format's reader; [`Error::Format`] or
 /// [`Error::Unsupported`] for a file of no format that is read.
 pub(super) fn read(path: &Path, mode: ReadMode) -> Result<Raster> {
     let io = |e| Error::io(path, e);
@@ -49,7 +49,7 @@ fn detect(path: &Path, bytes: &[u8]) -> Result<&'static Format> {
         return Err(Error::argument("the file", "empty", "a DEM").in_file(path));
     }
     let head = Head::new(path, bytes);
-    foreign::refuse_stand_in(path, &head)?;
+    foreign::refuse_failed_download(path, &head)?;
     if let Some(format) = FORMATS.iter().find(|format| (format.is_own)(&head)) {
         return Ok(format);
     }
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_are_told_by_content_then_by_extension() {
+    fn formats_are_recognised_by_content_then_by_extension() {
         let of = |head: &[u8], path: &str| detect(Path::new(path), head).map(|format| format.name);
         assert_eq!(of(b"II*\0abcd", "dem.asc").unwrap(), "GeoTIFF");
         assert_eq!(of(b"\xef\xbb\xbfNCOLS 3\n", "dem.tif").unwrap(), "ESRI ASCII grid");

@@ -53,7 +53,7 @@ impl Codec {
 
     /// The first `length` bytes of what was compressed to `stored`; never more, whatever is in there.
     pub(super) fn expand(self, stored: &[u8], length: usize) -> Result<Vec<u8>, String> {
-        /// So much room is made at once; more, which a damaged file may claim, as it is needed.
+        /// Bytes allocated at once; more, which a damaged file may claim, are allocated as they come.
         const ROOM: usize = 1 << 24;
         let mut bytes = Vec::with_capacity(length.min(ROOM));
         match self {

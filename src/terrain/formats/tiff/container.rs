@@ -1,4 +1,4 @@
-//! The file: its header, and numbers at a place.
+//! The file: its header, and unsigned integers at an offset.
 
 use super::error::{TiffResult, damaged};
 

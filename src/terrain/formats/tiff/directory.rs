@@ -27,7 +27,7 @@ struct Entry<'a> {
 impl<'a> Directory<'a> {
     /// The images of the file, in order. A damaged or circular tail ends the list, unless nothing came before.
     pub(crate) fn all(tiff: Tiff<'a>) -> TiffResult<Vec<Self>> {
-        /// More images than this are not looked at.
+        /// Most images that are read.
         const MOST: usize = 1000;
         let mut seen = vec![tiff.first];
         let mut list = vec![Self::read(tiff, tiff.first)?];

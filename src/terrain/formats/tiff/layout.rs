@@ -91,7 +91,7 @@ impl<'a> Layout<'a> {
 
     /// Refuses an image that claims more samples than its bytes can hold, before anything is allocated.
     fn check_size(&self) -> TiffResult<()> {
-        /// So many cells may be absent (sparse) without a byte to show for them, in so many bands.
+        /// Most cells, and bands of them, that may be absent (sparse), for which the file has no bytes.
         const SPARSE_CELLS: u64 = 1 << 24;
         const SPARSE_BANDS: u64 = 16;
         let planes = if self.chunks.planar { self.bands } else { 1 };
@@ -126,12 +126,12 @@ impl<'a> Layout<'a> {
             return Err(TiffError::TooLarge { bytes: (cells as u64).saturating_mul(8) });
         }
         let mut values = vec![0.0; cells];
-        // The first fault of the file, so that the message does not depend on the threads.
-        let fault = values
+        // The first error of the file, so that the message does not depend on the threads.
+        let error = values
             .par_chunks_mut(self.chunks.rows * self.cols)
             .enumerate()
             .find_map_first(|(down, rows)| self.read_chunk_row(band, down, rows).err());
-        fault.map_or(Ok(values), Err)
+        error.map_or(Ok(values), Err)
     }
 
     /// Fills the rows that one row of chunks covers.
