@@ -1,5 +1,4 @@
-//! Tiles: how the nodes of a grid are cut into squares, and how these lie beside each other, also where the grid closes on
-//! itself.
+//! Tiles: how the nodes of a grid are cut into squares, and which of these are neighbours, also where the grid is periodic.
 
 use std::ops::Range;
 
@@ -9,19 +8,19 @@ use crate::linalg::Sym2;
 use crate::linalg::bilinear::{CORNERS, corner_weights};
 use crate::linalg::lanes::LANES;
 
-/// Side of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
+/// Side length of a tile in nodes: as many as an AVX-512 register has `f32` lanes. 8 and 32 are slower (the shorter
 /// needs more activations, the longer more sweeps; design measurements at ratio 1 to 400).
 pub(crate) const SIDE: usize = LANES;
 /// Nodes of a tile.
 pub(crate) const AREA: usize = SIDE * SIDE;
 
-/// The neighbours of a tile as (tiles east, tiles south), counter-clockwise in index coordinates.
+/// The directions to the neighbours of a tile as (tiles east, tiles south): east, south-east and so on around, as on the ring of a node.
 pub(crate) const NEIGHBOURS: [(isize, isize); 8] =
     [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// The side on which the neighbour at `side` has this tile.
-pub(crate) fn opposite(side: usize) -> usize {
-    (side + 4) % 8
+/// The place in [`NEIGHBOURS`] of the opposite direction: where the neighbour has this tile.
+pub(crate) fn opposite(direction: usize) -> usize {
+    (direction + 4) % 8
 }
 
 /// How the nodes of a grid are cut into tiles.
@@ -29,9 +28,10 @@ pub(crate) fn opposite(side: usize) -> usize {
 pub(crate) struct Tiling {
     pub(crate) cols: usize,
     pub(crate) rows: usize,
+    /// Tiles in a row of tiles, and in a column.
     pub(crate) across: usize,
     pub(crate) down: usize,
-    /// Whether the first column comes again after the last, and the first row.
+    /// Whether the columns are periodic (after the last comes the first again), and the rows.
     pub(crate) periodic: [bool; 2],
 }
 
@@ -59,12 +59,12 @@ impl Tiling {
         DVec2::new((tile % self.across) as f64, (tile / self.across) as f64) * SIDE as f64
     }
 
-    /// The tiles that touch the square `radius` around a point, and perhaps some beside them.
+    /// The tiles that touch the square `radius` around a point, and perhaps some next to them.
     pub(crate) fn tiles_around(&self, at: DVec2, radius: f64) -> impl Iterator<Item = usize> {
         let span = |at: f64, count: usize| {
             let [from, to] =
                 [at - radius - 1.0, at + radius + 1.0].map(|x| (x / SIDE as f64).floor());
-            // An `as` clamps to what is there.
+            // `as` clamps to zero and above.
             from as usize..count.min((to + 1.0) as usize)
         };
         let (across, columns) = (self.across, span(at.x, self.across));
@@ -77,18 +77,18 @@ impl Tiling {
         [SIDE.min(self.cols - x * SIDE), SIDE.min(self.rows - y * SIDE)]
     }
 
-    /// Tile and place in it of a node.
+    /// Tile of a node, and its place there: row-major among the nodes of the tile.
     pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
         ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)
     }
 
-    /// The node that is found at a column and a row, counted on around the grid where it is periodic; `None` outside.
+    /// The node at a column and a row, modulo the size of the grid where it is periodic; `None` outside.
     pub(crate) fn node(&self, col: isize, row: isize) -> Option<(usize, usize)> {
         let [across, down] = self.periodic;
         Some((wrap(col, self.cols, across)?, wrap(row, self.rows, down)?))
     }
 
-    /// Whether the nodes within `margin` of `count` tiles side by side lie over the seam of a periodic direction.
+    /// Whether the nodes within `margin` of `count` consecutive tiles of a row reach over the seam of a periodic direction.
     pub(crate) fn is_over_seam(&self, tile: usize, count: usize, margin: usize) -> bool {
         let over =
             |at: usize, tiles: usize, count: usize| at == 0 || (at + tiles) * SIDE + margin > count;
@@ -100,7 +100,7 @@ impl Tiling {
     /// Tile and place in it of the node at a column and a row counted from the first of a tile; `None` outside.
     ///
     /// The last tile of a periodic direction may be wider than what is left of the grid. The places beyond are closed
-    /// and never updated, but seen from the tile they are the first nodes of the next turn, for their neighbours to
+    /// and never updated, but counted from the tile they are the first nodes of the grid again, for their neighbours to
     /// read.
     pub(crate) fn seen_from(&self, tile: usize, col: isize, row: isize) -> Option<(usize, usize)> {
         let (x, y) = (tile % self.across, tile / self.across);
@@ -116,18 +116,18 @@ impl Tiling {
         Some(y * self.across + x)
     }
 
-    /// The neighbours of a tile, each with its side: east, south-east and so on round.
+    /// The neighbours of a tile, each with its direction as a place in [`NEIGHBOURS`].
     pub(crate) fn neighbours(&self, tile: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
         let &Self { across, down, periodic, .. } = self;
         let (x, y) = (tile % across, tile / across);
         let is_inner = x > 0 && x + 1 < across && y > 0 && y + 1 < down;
-        NEIGHBOURS.into_iter().enumerate().filter_map(move |(side, (dx, dy))| {
+        NEIGHBOURS.into_iter().enumerate().filter_map(move |(direction, (dx, dy))| {
             if is_inner {
-                return Some((side, tile.wrapping_add_signed(dy * across as isize + dx)));
+                return Some((direction, tile.wrapping_add_signed(dy * across as isize + dx)));
             }
             let x = wrap(x as isize + dx, across, periodic[0])?;
             let y = wrap(y as isize + dy, down, periodic[1])?;
-            Some((side, y * across + x))
+            Some((direction, y * across + x))
         })
     }
 
@@ -160,7 +160,7 @@ impl Tiling {
         from.max(least[axis]).ceil() as isize..to.min(most[axis]).floor() as isize + 1
     }
 
-    /// A metric at a point from those of the nodes, where these have one: bilinear over the corners of the cell.
+    /// The metric at a point from those of the nodes, `None` where closed: bilinear over the open corners of the cell.
     pub(crate) fn bilinear(
         &self,
         at: DVec2,
@@ -177,7 +177,7 @@ impl Tiling {
         let mut weight = 0.0;
         for ((i, j), w) in CORNERS.into_iter().zip(corner_weights(inside)) {
             if let Some(metric) = metric(col + i, row + j) {
-                // A trace of weight for every open corner, so that a point on a closed one has a metric too.
+                // A little weight for every open corner, so that a point on a closed one has a metric too.
                 let w = w + 1e-9;
                 sum = sum + metric * w;
                 weight += w;
@@ -186,7 +186,7 @@ impl Tiling {
         (weight > 0.0).then(|| sum * (1.0 / weight))
     }
 
-    /// What to add to a point to come to its periodic images between `least` and `most`; in a direction that is not periodic there is
+    /// The shifts from a point to its periodic images between `least` and `most`; in a direction that is not periodic there is
     /// only the point itself.
     pub(crate) fn images(
         &self,
@@ -206,7 +206,7 @@ impl Tiling {
     }
 }
 
-/// The place of `at` among `count`, counted on around them if they are periodic.
+/// `at` if it is below `count`; modulo `count` if periodic, else `None`.
 pub(crate) fn wrap(at: isize, count: usize, periodic: bool) -> Option<usize> {
     match usize::try_from(at) {
         Ok(at) if at < count => Some(at),

@@ -2,19 +2,19 @@
 
 use crate::grid::tiling::Tiling;
 
-/// One in so many of the waiting tiles may be taken at once, however far apart their keys are. At ratio 400, where
-/// keys lie far apart, a round would else have 9 tiles of the 220 that wait: two threads took 34 ms, with a sixth of them 32,
+/// At least one in so many of the waiting tiles may be taken at once, however far apart their keys are. At ratio 400, where
+/// keys lie far apart, a round would otherwise have 9 tiles of the 220 that wait: two threads took 34 ms, with a sixth of them 32,
 /// one thread 50 and 51; with a fourth 53, and random speeds took 4 % longer.
 const SHARE: usize = 6;
 
-/// The side of changes in the tile itself, after those of its neighbours.
+/// In place of the direction to a neighbour: the tile itself.
 pub(crate) const ITSELF: usize = 8;
 
 /// Tiles with keys, of which the least are taken.
 #[derive(Debug)]
 pub(crate) struct ActiveSet {
-    /// The tiles that wait, in any order, and for each the least value that may still change it. Side by side, since
-    /// all keys are looked at in every round.
+    /// The tiles that wait, in any order, and for each its key: the least value that may still change it. In a vector of their own, since
+    /// all keys are read in every round.
     tiles: Vec<u32>,
     keys: Vec<f32>,
     entries: Vec<Entry>,
@@ -23,12 +23,12 @@ pub(crate) struct ActiveSet {
 /// What is known of a tile.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    /// Where it stands among those that wait.
+    /// Its index among those that wait.
     place: u32,
     /// Number of the round that last took the tile or one of its neighbours.
     taken: u32,
-    /// Where there are changes that it has not seen, one bit for each side as in [`Tiling::neighbours`] and one for the tile
-    /// [`ITSELF`], and the side with the least.
+    /// The directions from which there are changes that it has not taken into account, one bit each as in [`Tiling::neighbours`] and one for
+    /// the tile [`ITSELF`]; and the direction of the least of them.
     changed: u16,
     first: u8,
 }
@@ -48,7 +48,7 @@ impl ActiveSet {
         self.tiles.is_empty()
     }
 
-    /// Forgets all, where only the given tiles and those that wait were activated, taken or lie beside one that was.
+    /// Forgets all, provided that all tiles that were ever activated, or are neighbours of one that was taken, are among the given ones or wait.
     pub(crate) fn clear(&mut self, tiles: &[usize]) {
         for tile in self.tiles.drain(..) {
             self.entries[tile as usize] = Entry::NEW;
@@ -57,24 +57,24 @@ impl ActiveSet {
         tiles.iter().for_each(|&tile| self.entries[tile] = Entry::NEW);
     }
 
-    /// Lets a tile wait because values of at least `key` changed at a side of it.
-    pub(crate) fn activate(&mut self, tile: usize, key: f32, side: usize) {
+    /// Activates a tile because values changed, of which `key` is the least, in the neighbour in a direction or in the tile [`ITSELF`].
+    pub(crate) fn activate(&mut self, tile: usize, key: f32, direction: usize) {
         let entry = &mut self.entries[tile];
         if entry.place == Entry::NOWHERE {
             (entry.place, entry.changed) = (self.tiles.len() as u32, 0);
             self.tiles.push(tile as u32);
             self.keys.push(f32::INFINITY);
         }
-        entry.changed |= 1 << side;
+        entry.changed |= 1 << direction;
         let least = &mut self.keys[entry.place as usize];
         if key < *least {
             *least = key;
-            entry.first = side as u8;
+            entry.first = direction as u8;
         }
     }
 
     pub(crate) fn least_key(&self) -> f32 {
-        // Keys are not negative, so that their bits are in order; the minimum of integers is taken many at a time.
+        // The bits of numbers that are not negative are in the order of the numbers, and a minimum of integers is vectorised.
         let infinity = f32::INFINITY.to_bits();
         f32::from_bits(self.keys.iter().map(|key| key.to_bits()).fold(infinity, u32::min))
     }
@@ -91,8 +91,8 @@ impl ActiveSet {
         *self.keys.clone().select_nth_unstable_by(least, f32::total_cmp).1
     }
 
-    /// Takes the waiting tiles with keys up to `limit` that do not touch, lowest key first, and gives them, as the bits of
-    /// [`Job`]s, in order of place.
+    /// Takes waiting tiles with keys up to `limit`, lowest key first, no two of which are neighbours; appends them to `taken`, as the bits of
+    /// [`Job`]s, in the order of their numbers.
     pub(crate) fn take(&mut self, tiling: &Tiling, limit: f32, round: u32, taken: &mut Vec<u64>) {
         let waiting = self.keys.iter().zip(&self.tiles).filter(|&(&key, _)| key <= limit);
         let ranked = waiting.map(|(key, &tile)| u64::from(key.to_bits()) << 32 | u64::from(tile));
@@ -127,13 +127,13 @@ impl ActiveSet {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job {
     pub(crate) tile: u32,
-    /// Where there are changes, and the side with the least, as [`Problem::changed`](crate::eikonal::tile::kernel::Problem) has them.
+    /// Where there are changes, and where the least, as in [`Problem`](crate::eikonal::tile::kernel::Problem).
     pub(crate) changed: u16,
     pub(crate) first: u8,
 }
 
 impl Job {
-    /// The tile in the upper half, so that bits are in its order.
+    /// The tile in the upper half, so that the bits are in the order of the tiles.
     pub(crate) fn to_bits(self) -> u64 {
         u64::from(self.tile) << 32 | u64::from(self.changed) << 16 | u64::from(self.first)
     }

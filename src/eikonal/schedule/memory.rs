@@ -1,4 +1,4 @@
-//! Tiles in memory, shared by all threads.
+//! A tile store in memory, shared by all threads.
 
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
@@ -8,7 +8,7 @@ use crate::eikonal::tile::{Block, Limits};
 use crate::error::Result;
 use crate::grid::tiling::{AREA, SIDE, Tiling};
 
-/// The first of the stores: all tiles in memory.
+/// A [`TileStore`] that holds all tiles in memory.
 #[derive(Debug)]
 pub(crate) struct MemoryStore {
     pub(crate) values: SharedValues,
@@ -23,8 +23,8 @@ impl MemoryStore {
         }
     }
 
-    /// One whose values are not set: not to be read before they are. Fresh memory is given by the system when it is first
-    /// written.
+    /// A store whose values must be set before they are read. The system provides zeroed memory only as it is first written, so that this
+    /// is cheap.
     pub(crate) fn unset(tiling: Tiling) -> Self {
         let nodes = bytemuck::zeroed_vec(tiling.tiles() * AREA);
         let limits = (0..tiling.tiles()).map(|_| SharedLimits::default()).collect();
@@ -36,7 +36,7 @@ impl MemoryStore {
         self.limits[tile].get()
     }
 
-    /// Nothing is known of the tile any more.
+    /// Resets what is known of a tile.
     pub(crate) fn forget_limits(&self, tile: usize) {
         self.limits[tile].set(&Limits::default());
     }
@@ -95,8 +95,8 @@ impl SharedLimits {
 
 /// Values at the nodes as the bits of `f32`, tile by tile.
 ///
-/// The threads of a round write tiles that do not touch, so that nobody reads what another writes, and nothing is
-/// copied from thread to thread: a tile stays in the cache of the one that solved it last. The accesses are atomic only to
+/// The tiles that the threads write in a round are no neighbours, so that no thread reads what another writes, and nothing is
+/// copied from thread to thread: a tile stays in the cache of the core that solved it last. The accesses are atomic only to
 /// tell the compiler that this is safe; relaxed ones cost what plain ones do. The end of a round orders them.
 #[derive(Debug)]
 pub(crate) struct SharedValues {
@@ -139,7 +139,7 @@ impl SharedValues {
         let outside = self.outside;
         let (tx, ty) = (tile % self.tiling.across, tile / self.tiling.across);
         for (j, line) in block.iter_mut().enumerate() {
-            // Row and column of the block, counted in nodes from the tile before the first.
+            // The row of the grid, counted from one tile above the first row so that it is not negative.
             let row = ty * SIDE + SIDE + j - 1;
             let (ny, y) = (row / SIDE, row % SIDE);
             if ny == 0 || ny > self.tiling.down {
@@ -157,7 +157,7 @@ impl SharedValues {
         }
     }
 
-    /// [`read`](Self::read) node by node.
+    /// [`read`](Self::read) node by node, for tiles at the seam of a periodic direction.
     fn read_over_seam(&self, tile: usize, block: &mut Block) {
         for (node, place) in
             block.as_flattened_mut().iter_mut().zip(self.tiling.places_around(tile))
@@ -166,7 +166,7 @@ impl SharedValues {
         }
     }
 
-    /// Puts the values of a tile back.
+    /// Stores the values of a tile.
     pub(crate) fn write(&self, tile: usize, block: &Block) {
         for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..]) {
             for (bits, value) in line.iter().zip(&solved[1..=SIDE]) {
@@ -178,14 +178,14 @@ impl SharedValues {
         }
     }
 
-    /// Puts values at all places of a tile.
+    /// Stores values at all places of a tile.
     pub(crate) fn fill(&self, tile: usize, values: &[f32; AREA]) {
         for (bits, value) in self.tile(tile).iter().zip(values) {
             bits.store(value.to_bits(), Relaxed);
         }
     }
 
-    /// Puts the places of a tile beyond the grid outside again.
+    /// Sets the places of a tile that lie beyond the grid to `outside` again.
     fn close_beyond(&self, tile: usize) {
         let [cols, rows] = self.tiling.size(tile);
         for (row, line) in self.tile(tile).chunks_exact(SIDE).enumerate() {

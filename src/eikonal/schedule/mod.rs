@@ -1,10 +1,10 @@
 //! The Fast Iterative Method over tiles: which tile is solved when, by whom, and where values are kept meanwhile.
 //!
-//! A tile is solved by Gauss–Seidel sweeps until it stands still, then activates the neighbours that it could improve,
-//! each with a *key*: the least changed value that matters there. Tiles are taken in rounds in order of key,
+//! A tile is solved by Gauss–Seidel sweeps until it converges, then activates the neighbours that it could improve,
+//! each with a *key*: the least changed value that could improve it. Tiles are taken in rounds in order of key,
 //! which makes the method nearly label-setting; in order of arrival it would solve whole regions again
-//! each time a later, shorter front arrives. A round is a set of tiles no two of which touch, so they can be solved
-//! at the same time and the outcome does not depend on who solves which.
+//! each time a later, shorter front arrives. A round is a set of tiles no two of which are neighbours, so they can be solved
+//! at the same time and the outcome does not depend on which thread solves which.
 //!
 //! | file | answers |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Rounds: sets of tiles solved side by side, until nothing changes.
+//! Rounds: sets of tiles solved at the same time, until nothing changes.
 
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ use crate::eikonal::tile::{Limits, Tile};
 use crate::error::{Error, Location, Result};
 use crate::grid::tiling::{AREA, NEIGHBOURS, SIDE, Tiling, opposite};
 
-/// Activations of a tile after which a solve is given up, without and with factors taken out. Tiles of fields that converge took at
+/// Activations of a tile after which a solve is given up, without and with factors. Tiles of fields that converge took at
 /// most 34 at ratio 400, 86 at 2500, 19 on rough isotropic ones.
 const MOST_ACTIVATIONS: [u32; 2] = [5000, 500];
 
@@ -35,11 +35,11 @@ pub struct Statistics {
     pub activations: usize,
     /// Sweeps over a tile, whole or in part, all together.
     pub sweeps: usize,
-    /// Sets of tiles solved side by side.
+    /// Sets of tiles solved at the same time.
     pub rounds: usize,
 }
 
-/// What is to be solved, and to which share of a step.
+/// The equation on the whole grid, with its start values, and the tolerance as a share of a step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Equation<'a> {
     pub(crate) field: &'a TensorField,
@@ -63,7 +63,7 @@ pub(crate) struct Schedule<S> {
     pub(crate) store: S,
     pub(super) active: ActiveSet,
     activations: Vec<u32>,
-    /// How many nodes have a value from before.
+    /// How many nodes had a value before.
     pub(super) reached: usize,
     /// The greatest margin of any tile.
     margin: f32,
@@ -72,7 +72,7 @@ pub(crate) struct Schedule<S> {
 /// How a solve ended.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct End {
-    /// The least change that a tile has not seen: no value below that changes any more. Infinite when all is done.
+    /// The least change that a tile has not taken into account: no value below that changes any more. Infinite when all is solved.
     pub(crate) least_change: f32,
     pub(crate) statistics: Statistics,
 }
@@ -84,19 +84,19 @@ impl<S: TileStore> Schedule<S> {
         Self { store, active, activations: vec![0; tiles], reached: 0, margin }
     }
 
-    /// Activates a tile that holds start values, and the neighbours that some lie beside.
+    /// Activates a tile that holds start values, and the neighbours that some of them are next to.
     pub(crate) fn activate_seeds(&mut self, tiling: &Tiling, tile: usize, seeds: &Seeds) {
         let least = seeds.iter().copied().fold(f32::INFINITY, f32::min);
         self.active.activate(tile, least, ITSELF);
-        for (side, n) in tiling.neighbours(tile) {
-            let least = least_beside(seeds, tiling.size(tile), NEIGHBOURS[side]);
+        for (direction, n) in tiling.neighbours(tile) {
+            let least = least_next_to(seeds, tiling.size(tile), NEIGHBOURS[direction]);
             if least < f32::INFINITY {
-                self.active.activate(n, least, opposite(side));
+                self.active.activate(n, least, opposite(direction));
             }
         }
     }
 
-    /// Activates all tiles that hold start values or lie beside some.
+    /// Activates all tiles that hold start values or are next to some.
     pub(crate) fn activate_start(&mut self, tiling: &Tiling, seeds: &[Option<Box<Seeds>>]) {
         for (tile, seeds) in seeds.iter().enumerate() {
             seeds.iter().for_each(|seeds| self.activate_seeds(tiling, tile, seeds));
@@ -108,15 +108,15 @@ impl<S: TileStore> Schedule<S> {
         self.activations[tile] > 0
     }
 
-    /// Forgets a solve of which only the given tiles were solved or beside ones that were. What is stored stays.
+    /// Forgets a solve of which all tiles that were solved, and their neighbours, are given. What is stored stays.
     pub(crate) fn clear(&mut self, tiles: &[usize]) {
         self.active.clear(tiles);
         tiles.iter().for_each(|&tile| self.activations[tile] = 0);
         (self.reached, self.margin) = (0, 0.0);
     }
 
-    /// Solves the tiles that wait and those that their changes activate, in rounds, until `stop` allows to end. Before
-    /// a round `open` is given its jobs.
+    /// Solves the tiles that wait and those that their changes activate, in rounds, until `stop` is met. Before
+    /// a round `open` is called with its jobs.
     ///
     /// # Errors
     /// [`Error::NotConverged`]; those of the store; cancelled.
@@ -150,7 +150,8 @@ impl<S: TileStore> Schedule<S> {
         };
         let lead = |jobs: &mut Vec<u64>, outcomes: &[[u32; 11]]| -> Result<()> {
             for (job, &outcome) in jobs.drain(..).zip(outcomes) {
-                leader.take_in(Job::from_bits(job).tile as usize, &Outcome::from_bits(outcome))?;
+                leader
+                    .account_for(Job::from_bits(job).tile as usize, &Outcome::from_bits(outcome))?;
             }
             control.check()?;
             if failure.get().is_none() && leader.next_round(stop, control, jobs)? {
@@ -164,8 +165,8 @@ impl<S: TileStore> Schedule<S> {
     }
 }
 
-/// The least of the start values of a tile of a size next to the neighbour at `(dx, dy)`.
-fn least_beside(seeds: &Seeds, [cols, rows]: [usize; 2], (dx, dy): (isize, isize)) -> f32 {
+/// The least of the start values in a tile of the given size that are next to the neighbour at `(dx, dy)`.
+fn least_next_to(seeds: &Seeds, [cols, rows]: [usize; 2], (dx, dy): (isize, isize)) -> f32 {
     let line = |along: isize, count: usize| match along {
         0 => 0..count,
         1 => count - 1..count,
@@ -176,7 +177,7 @@ fn least_beside(seeds: &Seeds, [cols, rows]: [usize; 2], (dx, dy): (isize, isize
     places.map(|place| seeds[place]).fold(f32::INFINITY, f32::min)
 }
 
-/// What goes on between the rounds.
+/// What happens between the rounds, on one thread.
 struct Leader<'a, S> {
     equation: &'a Equation<'a>,
     store: &'a S,
@@ -188,8 +189,8 @@ struct Leader<'a, S> {
 }
 
 impl<S: TileStore> Leader<'_, S> {
-    /// Takes in what solving a tile brought: activates the neighbours that it can improve.
-    fn take_in(&mut self, tile: usize, outcome: &Outcome) -> Result<()> {
+    /// Takes the outcome of a tile into account: activates the neighbours that it can improve.
+    fn account_for(&mut self, tile: usize, outcome: &Outcome) -> Result<()> {
         let &Equation { field, factors, .. } = self.equation;
         let activations = &mut self.activations[tile];
         *activations += 1;
@@ -204,9 +205,9 @@ impl<S: TileStore> Leader<'_, S> {
         if outcome.unconverged < f32::INFINITY {
             self.active.activate(tile, outcome.unconverged, ITSELF);
         }
-        for (side, n) in field.tiling.neighbours(tile) {
-            if outcome.changes[side] < f32::INFINITY {
-                self.active.activate(n, outcome.changes[side], opposite(side));
+        for (direction, n) in field.tiling.neighbours(tile) {
+            if outcome.changes[direction] < f32::INFINITY {
+                self.active.activate(n, outcome.changes[direction], opposite(direction));
             }
         }
         Ok(())
@@ -288,8 +289,8 @@ fn solve_tile<S: TileStore>(
     let tiling = &equation.field.tiling;
     store.read(tile, workspace.values())?;
     let mut margins = [0.0; 8];
-    for (side, n) in tiling.neighbours(tile) {
-        margins[side] = store.limits(n)?.margin;
+    for (direction, n) in tiling.neighbours(tile) {
+        margins[direction] = store.limits(n)?.margin;
     }
     let problem = Problem {
         tile: equation.on(tile),

@@ -17,25 +17,25 @@ use crate::grid::tiling::{SIDE, Tiling, opposite};
 pub(crate) enum Changes<'a> {
     /// All of them: they are those of the start.
     All,
-    /// Those of and beside the nodes that are unreached in `before`, and around the `edited` nodes; the others are final,
-    /// or will be lowered by these.
+    /// Those at and next to the nodes that are unreached in `before`, and around the `edited` nodes (as for each tile in [`Changes::Lost`]); the
+    /// others are final, or will be lowered by these.
     Since { before: &'a Values, edited: &'a [f32] },
-    /// That nodes were edited and lost their values: for each tile the least of these, infinite if none. What came from
-    /// them is to be forgotten as well, see [`Rule::Forget`].
+    /// Nodes were edited and lost their values: for each tile the least of these, infinite if none. Values that came from
+    /// them are to be forgotten as well, see [`Rule::Forget`].
     Lost(&'a [f32]),
 }
 
-/// What a solve comes to.
+/// The result of a solve.
 #[derive(Debug)]
 pub(crate) struct Solution {
     pub(crate) values: Values,
-    /// What is known of each tile: what can improve it.
+    /// What is known of each tile, for going on later.
     pub(crate) limits: Vec<Limits>,
     pub(crate) statistics: Statistics,
 }
 
-/// Relaxes `values` to the solution of the discrete equation, starting from those that are `changes`, until `stop` allows to
-/// end. What is not final then is unreached. `limits` are those of the solution that the values are from.
+/// Relaxes `values` to the solution of the discrete equation, starting from those that are `changes`, until `stop` is
+/// met. What is not final then is unreached. `limits` are those of the solution that the values are from.
 ///
 /// # Errors
 /// [`Error::NotConverged`](crate::error::Error::NotConverged); cancelled.
@@ -69,18 +69,18 @@ pub(crate) fn solve(
     Ok(Solution { values, limits, statistics })
 }
 
-/// Activates every tile whose key is finite, and its neighbours on the sides to it.
+/// Activates every tile whose key is finite, and its neighbours.
 fn activate_around(tiling: &Tiling, keys: &[f32], active: &mut ActiveSet) {
     for (tile, &key) in keys.iter().enumerate().filter(|&(_, &key)| key < f32::INFINITY) {
         active.activate(tile, key, ITSELF);
-        for (side, n) in tiling.neighbours(tile) {
-            active.activate(n, key, opposite(side));
+        for (direction, n) in tiling.neighbours(tile) {
+            active.activate(n, key, opposite(direction));
         }
     }
 }
 
-/// Activates every tile with a node that was unreached before, and now has a value or is beside one. Also those around the
-/// `edited` nodes: a node that was opened opens a diagonal step between others, which need not change themselves.
+/// Activates every tile with a node that was unreached before, and now has a value or a neighbour with one. Also the tiles around the
+/// `edited` nodes: opening a node may allow a diagonal step between two others, which need not have changed themselves.
 fn activate_front(
     tiling: &Tiling,
     before: &Values,
@@ -101,8 +101,8 @@ fn activate_front(
         for (rows, before) in block.windows(3).zip(before.chunks_exact(SIDE)) {
             let across: [f32; BLOCK] =
                 std::array::from_fn(|i| rows[0][i].min(rows[1][i]).min(rows[2][i]));
-            for (beside, &before) in across.windows(3).zip(before) {
-                let least = beside[0].min(beside[1]).min(beside[2]);
+            for (three, &before) in across.windows(3).zip(before) {
+                let least = three[0].min(three[1]).min(three[2]);
                 key = key.min(if all || before == UNREACHED { least } else { UNREACHED });
             }
         }

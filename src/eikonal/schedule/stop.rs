@@ -10,16 +10,16 @@ use crate::eikonal::tile::Limits;
 use crate::error::{Error, Result};
 use crate::grid::tiling::AREA;
 
-/// When to stop. Whatever the rule, what a map reports is final: the same as without it, but for the tolerance. All else is
-/// unreached.
+/// When to stop. With any of them, the distances that a map reports are final: the same, within the tolerance, as without stopping. All other
+/// nodes are unreached.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Stop {
-    /// Once all that can be reached is.
+    /// Once all nodes that can be reached are final.
     #[default]
     Never,
-    /// Once the distances around all of these points (grid coordinates) are final. One that cannot be reached makes it `Never`.
+    /// Once the distances around all of these points (grid coordinates) are final. If one cannot be reached, as `Never`.
     AllGoals(Vec<DVec2>),
-    /// Once the distance around any of these points is.
+    /// Once the distance around any of these points is final.
     AnyGoal(Vec<DVec2>),
     /// Once all nodes up to this distance, in the unit of the metric, are final. Nodes farther away are unreached.
     Distance(f64),
@@ -57,7 +57,7 @@ pub(crate) struct Progress<'a, S> {
     pub(crate) reached: usize,
     /// The greatest margin of any tile.
     pub(crate) margin: f32,
-    /// The least change that a tile has not seen: no value below that changes any more. Infinite when all is done.
+    /// As in [`End::least_change`](super::rounds::End::least_change).
     pub(crate) least_change: f32,
 }
 
@@ -73,8 +73,8 @@ impl<S: TileStore> Progress<'_, S> {
         }
     }
 
-    /// The greatest change that can bear on a value to be reported: a node not reached by then is farther, one reached
-    /// may still come down by its margin.
+    /// The greatest change that can affect a value to be reported: a node that is not reached by then is farther away, and the value of one that is
+    /// reached can only be improved by a value below it plus the margin.
     pub(crate) fn last_change(&self, stop: &Stop) -> f32 {
         if !matches!(stop, Stop::Distance(_)) {
             return UNREACHED;
@@ -129,13 +129,13 @@ impl<S: TileStore> Progress<'_, S> {
     }
 }
 
-/// Whether no change of this value and above will change a node: a neighbour improves it only if its value is below the
-/// node's and the margin.
+/// Whether no change of `least_change` or above can change a node: a neighbour improves it only if its value is below that of
+/// the node plus the margin.
 pub(crate) fn is_final(value: f32, limits: &Limits, least_change: f32) -> bool {
     value < UNREACHED && value + limits.margin < least_change
 }
 
-/// Forgets all values that are not final while there are changes, or are not to be reported.
+/// Makes unreached all nodes whose values are not final given the changes left, or not to be reported.
 pub(crate) fn mask(
     values: &mut Values,
     field: &TensorField,

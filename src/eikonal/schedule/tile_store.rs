@@ -5,13 +5,13 @@ use crate::error::Result;
 
 /// Values at the nodes, and what is known of each tile, by the number of the tile.
 ///
-/// Who solves a tile reads it and what is around it and writes nothing but the tile. Those of a round do not touch, so nobody reads what
-/// another writes; what is written in a round must be read in the next.
+/// Solving a tile reads the tile and its halo and writes only the tile. The tiles of a round are no neighbours, so that no thread reads what
+/// another writes; what is written in one round must be visible in the next.
 pub(crate) trait TileStore: Sync {
     /// The values of a tile and of the nodes around it; infinite outside the grid.
     fn read(&self, tile: usize, block: &mut Block) -> Result<()>;
 
-    /// Puts the values of a tile back; of what lies around it nothing is taken, and what lies beyond the grid stays infinite.
+    /// Stores the values of a tile; those of its halo are ignored, and places beyond the grid stay infinite.
     fn write(&self, tile: usize, block: &Block) -> Result<()>;
 
     /// The value at a place of a tile.
@@ -20,10 +20,10 @@ pub(crate) trait TileStore: Sync {
     /// What is known of a tile; the default if it was never set.
     fn limits(&self, tile: usize) -> Result<Limits>;
 
-    /// Puts down what is known of a tile.
+    /// Stores what is known of a tile.
     fn set_limits(&self, tile: usize, limits: &Limits) -> Result<()>;
 
-    /// What a solve of the tile found: limits only grow.
+    /// Adds what a solve of the tile found: limits only grow.
     fn raise_limits(&self, tile: usize, found: &Limits) -> Result<()> {
         let known = self.limits(tile)?;
         let limits = Limits {

@@ -7,9 +7,9 @@ use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::tensor_field::{TensorField, TensorTile};
 use crate::grid::tiling::{AREA, Tiling};
 
-/// Tiles that one thread fills. A small field is filled by one alone: while it waited for another, it might take up other work of the
-/// pool, many times as long.
-const FEW: usize = 1024;
+/// Fewest tiles that a thread fills. A small field is filled by one thread alone: waiting for another, it might take up other work of the
+/// pool that takes many times as long.
+const MIN_TILES: usize = 1024;
 
 /// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +43,7 @@ impl Values {
     pub(crate) fn seeded(field: &TensorField, seeds: &[Option<Box<Seeds>>]) -> Self {
         let start = |tile: usize| at_start(field.tensors(tile), seeds[tile].as_deref());
         let tiles =
-            (0..field.tiling.tiles()).into_par_iter().with_min_len(FEW).map(start).collect();
+            (0..field.tiling.tiles()).into_par_iter().with_min_len(MIN_TILES).map(start).collect();
         Self { tiling: field.tiling, tiles }
     }
 

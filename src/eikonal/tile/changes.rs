@@ -1,4 +1,4 @@
-//! What a neighbouring tile can gain from the changes in a tile.
+//! Which changes in a tile can improve its neighbours.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
@@ -13,20 +13,20 @@ use crate::linalg::lanes::{choose, lanes, least};
 /// Four units in the last place of an `f32`: changes below are rounding.
 pub(crate) const ROUNDING: f32 = 2.4e-7;
 
-/// The rows and the columns of a tile of a size next to neighbours in a set, one bit each in the order of [`RING`]; a corner is in
-/// the row. Bit 8 is the tile itself: all rows.
-pub(super) fn lines_beside(sides: u16, [cols, rows]: [usize; 2]) -> [LineMask; 2] {
+/// The rows and the columns of a tile of the given size next to a set of neighbours, which has one bit each in the order of [`RING`]; for
+/// a neighbour at a corner, the row. Bit 8 is the tile itself: all rows.
+pub(super) fn lines_next_to(neighbours: u16, [cols, rows]: [usize; 2]) -> [LineMask; 2] {
     let line = |at: i32, count: usize| if at > 0 { 1 << (count - 1) } else { 1 };
-    let itself = if sides & 1 << RING.len() != 0 { ALL } else { 0 };
-    let beside = (0..RING.len()).filter(|side| sides & 1 << side != 0);
-    beside.fold([itself, 0], |[by_rows, by_cols], side| match RING[side] {
+    let itself = if neighbours & 1 << RING.len() != 0 { ALL } else { 0 };
+    let set = (0..RING.len()).filter(|direction| neighbours & 1 << direction != 0);
+    set.fold([itself, 0], |[by_rows, by_cols], direction| match RING[direction] {
         (dx, 0) => [by_rows, by_cols | line(dx, cols)],
         (_, dy) => [by_rows | line(dy, rows), by_cols],
     })
 }
 
-/// For each neighbour, in the order of [`RING`], the least value among the changes in a tile of a size that could improve it, or
-/// supported it; infinite if none. `margins` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
+/// For each neighbour, in the order of [`RING`], the least value among the changes in a tile of the given size that could improve it, or
+/// on which its values were based; infinite if none. `margins` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
 /// `g(y) < g(x) + margin`.
 pub(super) fn for_neighbours(
     before: &Block,
@@ -34,22 +34,22 @@ pub(super) fn for_neighbours(
     [cols, rows]: [usize; 2],
     margins: [f32; 8],
 ) -> [f32; 8] {
-    let across = |side: usize, row: usize| {
-        let beside = row.wrapping_add_signed(RING[side].1 as isize);
-        let [old, new, beside] =
-            [&before[row], &after[row], &after[beside]].map(|line| lanes(line, 1));
-        least_change(cols, old, new, beside, margins[side])
+    let across = |direction: usize, row: usize| {
+        let neighbour = row.wrapping_add_signed(RING[direction].1 as isize);
+        let [old, new, neighbour] =
+            [&before[row], &after[row], &after[neighbour]].map(|line| lanes(line, 1));
+        least_change(cols, old, new, neighbour, margins[direction])
     };
-    let down = |side: usize, col: usize| {
+    let down = |direction: usize, col: usize| {
         let line = |block: &Block, col: usize| from_fn(|row| block[row + 1][col]);
-        let beside = line(after, col.wrapping_add_signed(RING[side].0 as isize));
-        least_change(rows, line(before, col), line(after, col), beside, margins[side])
+        let neighbour = line(after, col.wrapping_add_signed(RING[direction].0 as isize));
+        least_change(rows, line(before, col), line(after, col), neighbour, margins[direction])
     };
-    let corner = |side: usize, col: usize, row: usize| {
-        let (dx, dy) = RING[side];
-        let beside =
+    let corner = |direction: usize, col: usize, row: usize| {
+        let (dx, dy) = RING[direction];
+        let neighbour =
             after[row.wrapping_add_signed(dy as isize)][col.wrapping_add_signed(dx as isize)];
-        improving(change(before[row][col], after[row][col]), beside, margins[side])
+        improving(change(before[row][col], after[row][col]), neighbour, margins[direction])
     };
     [
         down(0, cols),
@@ -63,12 +63,12 @@ pub(super) fn for_neighbours(
     ]
 }
 
-/// The least of the changes in the first `count` nodes of a line that could improve the line `beside` it.
+/// The least of the changes in the first `count` nodes of a line that could improve the `neighbour` line.
 fn least_change(
     count: usize,
     old: [f32; SIDE],
     new: [f32; SIDE],
-    beside: [f32; SIDE],
+    neighbour: [f32; SIDE],
     margin: f32,
 ) -> f32 {
     // With one place before and after.
@@ -79,18 +79,18 @@ fn least_change(
     let mut found = [f32::INFINITY; SIDE];
     for i in 0..SIDE {
         let change = least(least(padded[i], padded[i + 1]), padded[i + 2]);
-        found[i] = choose(i < count, improving(change, beside[i], margin), f32::INFINITY);
+        found[i] = choose(i < count, improving(change, neighbour[i], margin), f32::INFINITY);
     }
     found.into_iter().fold(f32::INFINITY, least)
 }
 
-/// The value that matters where a node changed; infinite where it did not.
+/// The lower of the old and the new value where a node changed; infinite where it did not.
 #[inline(always)]
 fn change(old: f32, new: f32) -> f32 {
     choose((old - new).abs() > ROUNDING * new, least(old, new), f32::INFINITY)
 }
 
-/// The change, if it could improve a value.
+/// The change, if it could improve a value; else infinite.
 #[inline(always)]
 fn improving(change: f32, value: f32, margin: f32) -> f32 {
     choose((value <= UNREACHED) & (change < value + margin), change, f32::INFINITY)

@@ -1,4 +1,4 @@
-//! What the update needs of the speed tensors, line by line.
+//! The coefficients of the update, computed from the speed tensors line by line.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
@@ -11,19 +11,19 @@ use crate::eikonal::stencil::segment::ClosedForm;
 use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
 
-/// What the update needs of `D` at the [`SIDE`] nodes of a line.
+/// The coefficients of the update at the [`SIDE`] nodes of a line.
 ///
 /// [`ClosedForm`] has the equation. `D = [xx xy; xy yy]` is at the same time `[s β; β q]` for `a = (1, 0)`, `b = (1, 1)`. The
 /// triangles along y have x and y exchanged; those with the other diagonal have `β` and `hi` with the other sign.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coefficients {
-    /// Of the triangles with the axis neighbour along x, and along y.
+    /// Those of the triangles with the axis neighbour along x, and along y.
     along: [Along; 2],
-    /// Lengths of the steps to the first four of the ring, and to those opposite.
+    /// Lengths of the steps to the first four places of the ring; those to the opposite places are the same.
     pub(crate) step: [Lanes; 4],
-    /// A change below this is no reason to go on.
+    /// A smaller change does not count.
     pub(crate) tolerance: Lanes,
-    /// The node is only lowered to below this: infinite but for nodes of the start.
+    /// The node is only lowered to values below this: infinite except at nodes of the start, see [`ceiling()`].
     pub(crate) ceiling: Lanes,
 }
 
@@ -40,8 +40,8 @@ struct Along {
 }
 
 impl Along {
-    /// Sets what node `i` needs, with `‖a‖`, and with `‖b‖` and `1/(det D ‖b‖)` of the rising diagonal and of the falling one. Comes
-    /// to how far the least over a segment may lie below an end, see [`Limits::margin`].
+    /// Sets the coefficients of node `i` from `‖a‖`, and from `‖b‖` and `1/(det D ‖b‖)` of the rising diagonal and of the falling one. Returns
+    /// how far the minimum over a segment may lie below the value at an end, see [`Limits::margin`].
     #[inline(always)]
     fn set(
         &mut self,
@@ -69,21 +69,21 @@ impl Along {
 pub(crate) type LineTensors = [Lanes; 3];
 
 impl Coefficients {
-    /// Nodes that are never updated: all steps are endless.
+    /// Nodes that are never updated: all steps are infinite.
     pub(crate) const CLOSED: Self = {
-        let (none, endless) = ([0.0; SIDE], [f32::INFINITY; SIDE]);
+        let (none, infinite) = ([0.0; SIDE], [f32::INFINITY; SIDE]);
         let along = Along {
-            inv_s: endless,
+            inv_s: infinite,
             det_over_s2: none,
             beta_over_s: none,
             hi: none,
             lo_rising: none,
             lo_falling: none,
         };
-        Self { along: [along; 2], step: [endless; 4], tolerance: endless, ceiling: endless }
+        Self { along: [along; 2], step: [infinite; 4], tolerance: infinite, ceiling: infinite }
     };
 
-    /// Those of a line of a tile, a column where `by_columns`.
+    /// Computes those of a line of a tile, a column where `by_columns`.
     #[inline(always)]
     pub(crate) fn prepare(
         &mut self,
@@ -122,7 +122,7 @@ impl Coefficients {
             self.ceiling[i] = choose(open, f32::INFINITY, f32::NEG_INFINITY);
             longest[i] = choose(open, greatest(rising, falling), 0.0);
         }
-        // In a loop of its own, or the limits are scattered lane by lane.
+        // In a loop of its own, or the limits would be stored lane by lane.
         for i in 0..SIDE {
             limits.margin[i] = greatest(limits.margin[i], obtuse[i]);
             limits.longest_step[i] = greatest(limits.longest_step[i], longest[i]);
@@ -170,7 +170,7 @@ impl Coefficients {
     }
 }
 
-/// [`Limits`] of the nodes in each lane; their greatest at once would be a chain of comparisons, one after the other.
+/// [`Limits`] of the nodes in each lane; a running maximum over all nodes would be one long chain of dependent comparisons.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct LaneLimits {
     margin: Lanes,
@@ -180,7 +180,7 @@ pub(crate) struct LaneLimits {
 }
 
 impl LaneLimits {
-    /// Those of all nodes.
+    /// The greatest over all lanes.
     pub(crate) fn of_all(&self) -> Limits {
         let all = |lanes: &Lanes| lanes.iter().copied().fold(0.0, greatest);
         Limits {
@@ -203,14 +203,14 @@ pub(crate) fn line_tensors(tile: &Tile<'_>, line: usize, by_columns: bool) -> Li
         let place = i * SIDE + line;
         (xx[i], xy[i], det[i]) = (all.xx[place], all.xy[place], all.det[place]);
     }
-    // What is `yy` by rows.
+    // The `xx` of a column is the `yy` of rows.
     for i in 0..SIDE {
         xx[i] = (det[i] + xy[i] * xy[i]) / xx[i];
     }
     [xx, xy, det]
 }
 
-/// The factoring terms at the nodes of one line of a tile: 0 without a factor.
+/// Computes the factoring terms at the nodes of one line of a tile: 0 without a factor.
 #[inline(always)]
 pub(crate) fn factoring_terms(
     tile: &Tile<'_>,
@@ -233,9 +233,8 @@ pub(crate) fn factoring_terms(
     }
 }
 
-/// What a node of the start has to be lowered to below, if ever. The values near the start are of second order, the update is
-/// only of first and may lie below them; one that is lower by half a step is from another start. Infinite
-/// for other nodes.
+/// The value below which a node of the start may be lowered; infinite for other nodes. Start values are of second order, while the
+/// update is only of first order and may lie a little below them; one that is lower by half a step comes from another start.
 #[inline(always)]
 pub(crate) fn ceiling(seed: f32, shortest_step: f32) -> f32 {
     choose(seed < UNREACHED, seed - 0.5 * shortest_step, f32::INFINITY)

@@ -1,7 +1,7 @@
-//! The heart: sweeps over a tile until it converges.
+//! The tile kernel: sweeps over a tile until it converges.
 //!
 //! Semi-Lagrangian update on the eight triangles around a node `x` (index units, spacing 1): the distance
-//! at `x` is the least, over the ring of its neighbours, of the distance on the ring plus the length of the
+//! at `x` is the minimum, over the ring of its neighbours, of the distance on the ring plus the length of the
 //! straight step to it,
 //!
 //! ```text
@@ -15,12 +15,12 @@
 //! ```
 //!
 //! [`segment`](crate::eikonal::stencil::segment::segment) is that minimum over one segment in plain form,
-//! [`Coefficients::best`] the closed form over all eight. A sweep updates a whole row (or column) of nodes at a time, 16 side by side, and carries
-//! changes across the tile in the directions within 45° of its own. Lines none of whose neighbours changed are left out.
+//! [`Coefficients::best`] the closed form over all eight. A sweep updates a whole row (or column) of 16 nodes at a time, one in each lane,
+//! and carries changes across the tile in the directions within 45° of its own. Lines none of whose neighbours changed are skipped.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use super::changes::{ROUNDING, for_neighbours, lines_beside};
+use super::changes::{ROUNDING, for_neighbours, lines_next_to};
 use super::coefficients::{Coefficients, LaneLimits, factoring_terms, line_tensors};
 use super::transpose::transpose_block;
 use super::{ALL, BLOCK, Block, Limits, LineMask, Tile};
@@ -30,7 +30,7 @@ use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
 use crate::linalg::simd::{self, Kernel};
 
-/// Sweeps of a tile after which it is given back, though it may not have converged.
+/// Sweeps of a tile after which it is returned, though it may not have converged.
 const MAX_SWEEPS: u32 = 16;
 
 /// A tile to be solved; its values are in the [`Workspace`].
@@ -40,7 +40,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) rule: Rule,
     /// Columns and rows that lie in the grid.
     pub(crate) size: [usize; 2],
-    /// The neighbours with changes that have not been looked at, one bit each in the order of [`RING`]; bit 8 is the tile itself.
+    /// The neighbours with changes that the tile has not taken into account, one bit each in the order of [`RING`]; bit 8 is the tile itself.
     pub(crate) changed: u16,
     /// The one of them with the least change.
     pub(crate) first: u8,
@@ -55,7 +55,7 @@ pub(crate) struct Problem<'a> {
 pub(crate) enum Rule {
     /// Lowers it to its best value over the ring.
     Lower,
-    /// Makes it unreached if its ring no longer supports its value: if the best value over the ring is higher.
+    /// Makes it unreached if its ring no longer supports its value, that is, if the best value over the ring is higher.
     Forget,
 }
 
@@ -68,12 +68,12 @@ pub(crate) struct Solved {
     pub(crate) changes: [f32; 8],
     /// The least value of the tile if it has not converged yet; infinite if it has.
     pub(crate) unconverged: f32,
-    /// Of the nodes that were looked at.
+    /// Of the nodes that were updated.
     pub(crate) limits: Limits,
     pub(crate) sweeps: u32,
 }
 
-/// Where a tile is solved; made once for many.
+/// The memory in which a tile is solved; made once for many.
 #[derive(Debug)]
 pub(crate) struct Workspace {
     /// Transposed while sweeps go by columns.
@@ -123,7 +123,7 @@ pub(crate) fn solve(workspace: &mut Workspace, problem: &Problem<'_>) -> Solved 
     let limits = limits.of_all();
     let nothing = [f32::INFINITY; 8];
     let changes = if is_changed {
-        let margins = with_own(problem.margins, problem.is_own_neighbour, limits.margin);
+        let margins = margins_with_own(problem.margins, problem.is_own_neighbour, limits.margin);
         for_neighbours(before, values, problem.size, margins)
     } else {
         nothing
@@ -140,7 +140,7 @@ struct Swept {
 }
 
 fn sweep(workspace: &mut Workspace, problem: &Problem<'_>) -> Swept {
-    // A kernel for each: one that chooses inside was 2 to 4 % slower. What forgets is seldom run.
+    // A kernel for each: one that chooses inside was 2 to 4 % slower. `Forget` is seldom run, so that one with factoring does for both.
     match (problem.rule, problem.tile.factor.is_some()) {
         (Rule::Lower, false) => {
             simd::dispatch(Sweeps::<_, false> { workspace, problem, update: Lower })
@@ -163,7 +163,7 @@ struct Sweeps<'a, U, const IS_FACTORED: bool> {
 impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
     type Output = Swept;
 
-    /// Away from the least change and back, then across and back.
+    /// Sweeps away from the least change and back, then across and back.
     #[inline(always)]
     fn run(self) -> Swept {
         let Self { workspace, problem, update } = self;
@@ -171,8 +171,9 @@ impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
         let (dx, dy) = if usize::from(first) < 8 { RING[usize::from(first)] } else { (0, 0) };
         let mut descending = [dy > 0, dx > 0];
         let mut by_columns = dx != 0 && dy == 0;
-        // Rows and columns owed to changes outside, and those owed to changes inside, which either pays off.
-        let mut outside = lines_beside(changed, size);
+        // Rows and columns next to changes in the neighbours, each of which has to be swept; and those next to changes of the last sweep,
+        // of which sweeping either the rows or the columns is enough.
+        let mut outside = lines_next_to(changed, size);
         let mut inside = [0; 2];
         let mut swept = Swept { sweeps: 0, is_changed: false, is_converged: false };
         loop {
@@ -180,24 +181,24 @@ impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
             if swept.is_converged || swept.sweeps == MAX_SWEEPS {
                 return swept;
             }
-            let side = usize::from(by_columns);
-            let dirty = outside[side] | inside[side];
+            let axis = usize::from(by_columns);
+            let dirty = outside[axis] | inside[axis];
             if dirty != 0 {
-                let descending = &mut descending[side];
+                let descending = &mut descending[axis];
                 inside =
                     workspace.sweep::<IS_FACTORED>(&update, tile, by_columns, *descending, dirty);
-                outside[side] = 0;
+                outside[axis] = 0;
                 swept.sweeps += 1;
                 swept.is_changed |= inside != [0; 2];
                 *descending = !*descending;
             }
-            by_columns ^= dirty == 0 || outside[1 - side] != 0 || swept.sweeps.is_multiple_of(2);
+            by_columns ^= dirty == 0 || outside[1 - axis] != 0 || swept.sweeps.is_multiple_of(2);
         }
     }
 }
 
-/// The margins of the neighbours; where the tile itself is one, not less than was found of it now.
-fn with_own(mut margins: [f32; 8], is_own_neighbour: [bool; 2], own: f32) -> [f32; 8] {
+/// The margins of the neighbours; where the tile is its own neighbour, no less than was found just now.
+fn margins_with_own(mut margins: [f32; 8], is_own_neighbour: [bool; 2], own: f32) -> [f32; 8] {
     for k in 0..8 {
         let (dx, dy) = RING[k];
         if (dx == 0 || is_own_neighbour[0]) && (dy == 0 || is_own_neighbour[1]) {
@@ -240,7 +241,7 @@ impl Workspace {
     /// One Gauss–Seidel sweep over the rows (or columns) in `dirty`, from the first to the last or the other way
     /// (`descending`), taking in those that become dirty ahead of it.
     ///
-    /// Returns the rows and the columns next to which something changed: doing either of them again does all.
+    /// Returns the rows and the columns next to which something changed: sweeping either all these rows or all these columns again is enough.
     #[inline(always)]
     fn sweep<const IS_FACTORED: bool>(
         &mut self,
@@ -276,7 +277,7 @@ impl Workspace {
 }
 
 impl Prepared {
-    /// Makes what a line needs.
+    /// Computes what a line needs, unless it is ready.
     #[inline(always)]
     fn prepare<const IS_FACTORED: bool>(
         &mut self,
@@ -328,7 +329,7 @@ fn update_line<const IS_FACTORED: bool>(
     any != 0
 }
 
-/// A line and the ones beside it.
+/// A line and the ones next to it.
 #[inline(always)]
 fn around(line: usize) -> LineMask {
     ((0b111 << line) >> 1) & ALL
@@ -336,7 +337,7 @@ fn around(line: usize) -> LineMask {
 
 /// A [`Rule`].
 trait Update {
-    /// The new value of node `i` of a line, from the old one and the best over its ring; and whether that is a change to be carried on.
+    /// The new value of node `i` of a line, from the old one and the best over its ring; and whether the nodes around it have to be updated.
     fn update(&self, old: f32, best: f32, k: &Coefficients, i: usize) -> (f32, bool);
 }
 
@@ -357,10 +358,10 @@ impl Update for Forget {
     #[inline(always)]
     fn update(&self, old: f32, best: f32, k: &Coefficients, i: usize) -> (f32, bool) {
         let rounding = ROUNDING * old;
-        // Where it is not far below the shortest step, nodes could support each other.
+        // Where rounding is not far below the shortest step, two nodes could support each other.
         let is_small = rounding * rounding < 0.25 * k.least_square_of_steps(i);
         let is_supported = (best <= old + rounding) & is_small;
-        // Values of the start hold by themselves.
+        // Start values need no support.
         let is_lost = !is_supported & (old < least(k.ceiling[i], UNREACHED));
         (choose(is_lost, UNREACHED, old), is_lost)
     }

@@ -1,7 +1,7 @@
 //! Solving a tile: a pure function of its tensors, the values in it and around it, and the start values.
 //!
 //! Nothing here knows where tiles are stored or when they are solved. [`kernel::solve`] is given the equation ([`Tile`]) and which
-//! neighbours have changes; it returns values, what could improve each neighbour, and [`Limits`].
+//! neighbours have changes; it returns values, the changes that could improve each neighbour, and [`Limits`].
 
 pub(crate) mod changes;
 pub(crate) mod coefficients;
@@ -31,7 +31,7 @@ pub(crate) const ALL: LineMask = (1 << SIDE) - 1;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile<'a> {
     pub(crate) tensors: &'a TensorTile,
-    /// What is taken out around a point of the start, and the tile's first node.
+    /// The factor that may apply in the tile, and the tile's first node.
     pub(crate) factor: Option<(&'a Factor, DVec2)>,
     /// A change below this share of a node's shortest step does not count.
     pub(crate) tolerance: f32,
@@ -42,9 +42,9 @@ pub(crate) struct Tile<'a> {
 /// What is known of the updated nodes of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Limits {
-    /// The causality margin: by how much the value of a neighbour may exceed that of a node and still improve it. A node's least over a segment
-    /// is above both ends unless the directions to them make an obtuse angle under `M`; then it may lie below
-    /// one end `a` by up to `−aᵀMb/‖b‖`. Source factoring lowers the neighbours' values besides.
+    /// The causality margin: by how much the value of a neighbour may exceed that of a node and still improve it. The minimum over a segment
+    /// exceeds the values at both ends unless the directions to them make an obtuse angle under `M`; then it may lie below that at
+    /// one end `a` by up to `−aᵀMb/‖b‖`. Source factoring adds to the margin by lowering the neighbours' values.
     pub(crate) margin: f32,
     /// The longest step of any node.
     pub(crate) longest_step: f32,
