@@ -94,7 +94,7 @@ impl Scenario {
         self.georeference.frame()
     }
 
-    /// The user's speed tensors at the nodes, row-major, if the question names some.
+    /// The user's speed tensors at the nodes, row-major, x east and y north, if the question names some.
     #[must_use]
     pub fn tensors(&self) -> Option<&Arc<[Sym2]>> {
         self.tensors.as_ref()
@@ -155,7 +155,7 @@ impl Scenario {
         field.level().filter(|level| self.question.climb_weight > LARGEST * level)
     }
 
-    /// Distance from the nearest start, at all goals at least.
+    /// Distance from the nearest start in the unit of `field`, at all goals at least.
     ///
     /// # Errors
     /// [`Error::NoPath`] if a goal cannot be reached, with the nearest place that can; those of

@@ -10,7 +10,7 @@ use crate::metric::MetricField;
 use crate::surface::Surface;
 
 /// Most clusters of a cover: beyond this `ε` is surely a mistake.
-const MOST: usize = 1 << 16;
+const MOST_CLUSTERS: usize = 1 << 16;
 
 /// `|K|` at the nodes, row-major, 1/m²: seeds of the curvature metric are taken in ascending order of it, so that the first clusters
 /// are those of the flattest ground. Cost: one evaluation of the surface per node.
@@ -68,7 +68,7 @@ pub(super) struct SeedCover {
 /// largest distance from the first seed.
 ///
 /// # Errors
-/// More than [`MOST`] clusters; cancelled.
+/// More than [`MOST_CLUSTERS`] clusters; cancelled.
 pub(super) fn seed_cover(
     field: &TensorField,
     ranks: &[f64],
@@ -96,7 +96,7 @@ pub(super) fn seed_cover(
         if is_held[seed] {
             continue;
         }
-        if seeds.len() == MOST {
+        if seeds.len() == MOST_CLUSTERS {
             let held = is_held.iter().filter(|&&held| held).count();
             return Err(too_small(epsilon, held, order.len()));
         }
@@ -108,10 +108,10 @@ pub(super) fn seed_cover(
     Ok(SeedCover { seeds, epsilon })
 }
 
-/// Refuses clusters of which [`MOST`] hold only so many of the open nodes.
+/// Refuses clusters of which [`MOST_CLUSTERS`] hold only so many of the open nodes.
 fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
     let share = held as f64 / open as f64;
-    let advice = if held > 2 * MOST {
+    let advice = if held > 2 * MOST_CLUSTERS {
         // A cluster holds as many nodes as the square of its radius, the last ones fewer: to two digits.
         let larger = 1.5 * epsilon / share.sqrt();
         let scale = 10f64.powi(1 - larger.log10().floor() as i32);
@@ -122,7 +122,7 @@ fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
     Error::argument(
         "epsilon",
         format!(
-            "{epsilon:?}, so small that {MOST} clusters hold only {:.1} % of the surface",
+            "{epsilon:?}, so small that {MOST_CLUSTERS} clusters hold only {:.1} % of the surface",
             100.0 * share
         ),
         "larger",
@@ -147,7 +147,7 @@ mod tests {
         let field = TensorField::from_fn(300, 300, tensor, &control).unwrap();
         let refusal = seed_cover(&field, &vec![0.0; 300 * 300], Some(0.0), &control).unwrap_err();
         assert!(refusal.to_string().contains("72.8 %"), "{refusal}");
-        let refusal = too_small(0.2, 2 * MOST + 1, 8 * MOST);
+        let refusal = too_small(0.2, 2 * MOST_CLUSTERS + 1, 8 * MOST_CLUSTERS);
         assert!(refusal.to_string().ends_with("one of 0.6 may do"), "{refusal}");
     }
 }

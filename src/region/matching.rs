@@ -12,7 +12,7 @@ pub struct Match {
     pub first: usize,
     /// The region of the second surface; of one surface the one with the larger number.
     pub second: usize,
-    /// How unlike they are, 0 to 1, see [`Signature::distance`].
+    /// How unlike they are, 0 to 1: [`Signature::distance`], or [`Signature::sized_distance`] where size counts.
     pub distance: f64,
     /// Size of the second as a multiple of the first's.
     pub size_ratio: f64,
@@ -53,44 +53,44 @@ fn greedy(
     slot: impl Fn(usize) -> usize,
     sized: bool,
 ) -> Result<Vec<Match>> {
-    const MOST: usize = 1 << 24;
-    if first.len().saturating_mul(second.len()) > MOST {
+    const MOST_PAIRS: usize = 1 << 24;
+    if first.len().saturating_mul(second.len()) > MOST_PAIRS {
         return Err(Error::argument(
             "the number of regions",
             format!("{} and {}", first.len(), second.len()),
-            format!("so few that there are at most {MOST} pairs"),
+            format!("so few that there are at most {MOST_PAIRS} pairs"),
         )
         .advise("segment more coarsely"));
     }
-    let unlike = |i: usize, j: usize| {
+    let dissimilarity = |i: usize, j: usize| {
         let (a, b) = (&first[i], &second[j]);
         if sized { a.sized_distance(b) } else { a.distance(b) }
     };
     // In a region of one node, or of none, nothing varies: it is like none.
     let varies = |signature: &Signature| signature.eigenvalues[0] > 0.0;
     let pairs = pairs.filter(|&(i, j)| varies(&first[i]) && varies(&second[j]));
-    let mut pairs: Vec<_> = pairs.map(|(i, j)| (unlike(i, j), i, j)).collect();
+    let mut pairs: Vec<_> = pairs.map(|(i, j)| (dissimilarity(i, j), i, j)).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let mut state = vec![Region::default(); first.len() + second.len()];
+    let mut states = vec![State::default(); first.len() + second.len()];
     let mut found = Vec::new();
     for (distance, i, j) in pairs {
-        let (a, b) = (state[i], state[slot(j)]);
+        let (a, b) = (states[i], states[slot(j)]);
         if !a.taken && !b.taken {
             let mutual = !a.seen && !b.seen;
             let size_ratio = second[j].size / first[i].size;
             found.push(Match { first: i, second: j, distance, size_ratio, mutual });
-            state[i].taken = true;
-            state[slot(j)].taken = true;
+            states[i].taken = true;
+            states[slot(j)].taken = true;
         }
-        state[i].seen = true;
-        state[slot(j)].seen = true;
+        states[i].seen = true;
+        states[slot(j)].seen = true;
     }
     Ok(found)
 }
 
 /// What has become of a region so far.
 #[derive(Clone, Copy, Default)]
-struct Region {
+struct State {
     /// It was in a pair.
     seen: bool,
     /// It has its match.

@@ -30,12 +30,12 @@ impl Segmentation {
         loop {
             control.report("merging", 0.0);
             let found = signatures(surface, &level.labels, Neighbours::Surface, control)?;
-            let unlike = |[a, b]: [u32; 2]| found[a as usize].distance(&found[b as usize]);
+            let dissimilarity = |[a, b]: [u32; 2]| found[a as usize].distance(&found[b as usize]);
             let mut pairs: Vec<_> = level
                 .siblings(self.cols, surface.periodic())
                 .into_iter()
-                .map(|pair| (unlike(pair), pair))
-                .filter(|(unlike, _)| *unlike <= tolerance)
+                .map(|pair| (dissimilarity(pair), pair))
+                .filter(|(dissimilarity, _)| *dissimilarity <= tolerance)
                 .collect();
             pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             if pairs.is_empty() {
@@ -51,8 +51,8 @@ impl Level {
     fn siblings(&self, cols: usize, [across, down]: [bool; 2]) -> Vec<[u32; 2]> {
         let rows = self.labels.len() / cols;
         let mut pairs = Vec::new();
-        for (place, label) in self.labels.iter().enumerate() {
-            let (col, row) = (place % cols, place / cols);
+        for (index, label) in self.labels.iter().enumerate() {
+            let (col, row) = (index % cols, index / cols);
             let east = wrap(col as isize + 1, cols, across).map(|col| row * cols + col);
             let south = wrap(row as isize + 1, rows, down).map(|row| row * cols + col);
             for other in [east, south].into_iter().flatten() {
@@ -126,7 +126,7 @@ mod tests {
 
     /// Six regions of ten columns.
     fn strips(parents: [Option<u32>; 6]) -> Segmentation {
-        let labels = (0..60 * 20).map(|place| Some((place % 60 / 10) as u32)).collect();
+        let labels = (0..60 * 20).map(|index| Some((index % 60 / 10) as u32)).collect();
         let region = |i: usize| Region { seed: [10 * i + 5, 10], parent: parents[i], epsilon: 1.0 };
         let level = Level { labels, regions: (0..6).map(region).collect() };
         Segmentation { cols: 60, rows: 20, levels: vec![level] }

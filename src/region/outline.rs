@@ -18,9 +18,9 @@ use crate::grid::contains;
 pub fn outlines(level: &Level, cols: usize) -> Vec<MultiPolygon<f64>> {
     let mut sides = vec![Vec::new(); level.regions.len()];
     let cells = Cells { labels: &level.labels, cols, rows: level.labels.len() / cols.max(1) };
-    for (place, label) in level.labels.iter().enumerate() {
+    for (index, label) in level.labels.iter().enumerate() {
         if let Some(label) = label {
-            cells.add_sides(place % cols, place / cols, &mut sides[*label as usize]);
+            cells.add_sides(index % cols, index / cols, &mut sides[*label as usize]);
         }
     }
     sides
@@ -71,11 +71,11 @@ impl Cells<'_> {
             let straight = after.wrapping_sub(here) == here.wrapping_sub(before);
             !straight || self.labels_around(here) > 2
         });
-        let place = |i: usize| {
+        let coordinates = |i: usize| {
             let (col, row) = (ring[i] % (self.cols + 1), ring[i] / (self.cols + 1));
             Coord { x: col as f64 - 0.5, y: row as f64 - 0.5 }
         };
-        let mut corners: LineString<f64> = kept.map(place).collect();
+        let mut corners: LineString<f64> = kept.map(coordinates).collect();
         corners.close();
         corners
     }
@@ -96,19 +96,19 @@ fn rings(mut sides: Vec<[usize; 2]>) -> Vec<Vec<usize>> {
     let mut rings = Vec::new();
     let mut path: Vec<usize> = Vec::new();
     // Where on the path each of its corners is.
-    let mut places = HashMap::new();
+    let mut positions = HashMap::new();
     for first in 0..sides.len() {
         let mut next = (!used[first]).then_some(first);
         while let Some(side) = next {
             used[side] = true;
             let [from, to] = sides[side];
-            places.insert(from, path.len());
+            positions.insert(from, path.len());
             path.push(from);
             // The path has come round to a corner: what lies between is a ring.
-            if let Some(&start) = places.get(&to) {
+            if let Some(&start) = positions.get(&to) {
                 let ring = path.split_off(start);
                 for corner in &ring {
-                    places.remove(corner);
+                    positions.remove(corner);
                 }
                 rings.push(ring);
             }

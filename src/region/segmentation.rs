@@ -154,9 +154,9 @@ impl Level {
         let window = Window { first, cols: field.cols() };
         let mut inside = vec![false; field.cols() * field.rows()];
         let mut window_ranks = vec![f64::NAN; inside.len()];
-        for &place in part {
-            inside[window.place(place, cols)] = true;
-            window_ranks[window.place(place, cols)] = ranks[place];
+        for &index in part {
+            inside[window.index(index, cols)] = true;
+            window_ranks[window.index(index, cols)] = ranks[index];
         }
         field.restrict(|col, row| inside[row * window.cols + col]);
 
@@ -167,8 +167,8 @@ impl Level {
         let mut labels = map.allocation();
         fill(&mut labels, &inside, window.cols);
         let first = self.regions.len() as u32;
-        for &place in part {
-            self.labels[place] = labels[window.place(place, cols)].map(|label| first + label);
+        for &index in part {
+            self.labels[index] = labels[window.index(index, cols)].map(|label| first + label);
         }
         let region =
             |&seed: &usize| Region { seed: window.node(seed), parent, epsilon: cover.epsilon };
@@ -179,9 +179,9 @@ impl Level {
     /// The nodes of each region.
     fn parts(&self) -> Vec<Vec<usize>> {
         let mut parts = vec![Vec::new(); self.regions.len()];
-        for (place, label) in self.labels.iter().enumerate() {
+        for (index, label) in self.labels.iter().enumerate() {
             if let Some(label) = label {
-                parts[*label as usize].push(place);
+                parts[*label as usize].push(index);
             }
         }
         parts
@@ -207,14 +207,16 @@ fn fill(labels: &mut [Option<u32>], inside: &[bool], cols: usize) {
     }
 }
 
-/// The columns and rows that hold all the places (indices of nodes, ascending) of a row-major grid with `cols` columns.
-fn spans(places: &[usize], cols: usize) -> [Range<usize>; 2] {
-    let [Some(&first), Some(&last)] = [places.first(), places.last()] else { return [0..0, 0..0] };
-    let widen = |span: Range<usize>, &place: &usize| {
-        let col = place % cols;
+/// The columns and rows that hold all nodes of these ascending indices in a row-major grid with `cols` columns.
+fn spans(indices: &[usize], cols: usize) -> [Range<usize>; 2] {
+    let [Some(&first), Some(&last)] = [indices.first(), indices.last()] else {
+        return [0..0, 0..0];
+    };
+    let widen = |span: Range<usize>, &index: &usize| {
+        let col = index % cols;
         span.start.min(col)..span.end.max(col + 1)
     };
-    [places.iter().fold(cols..0, widen), first / cols..last / cols + 1]
+    [indices.iter().fold(cols..0, widen), first / cols..last / cols + 1]
 }
 
 /// A part of a grid.
@@ -225,14 +227,14 @@ struct Window {
 }
 
 impl Window {
-    /// A place of the grid, with `cols` columns, as a place of the window.
-    fn place(&self, place: usize, cols: usize) -> usize {
-        (place / cols - self.first[1]) * self.cols + place % cols - self.first[0]
+    /// The index in the window of a node, given by its index in the grid of `cols` columns.
+    fn index(&self, index: usize, cols: usize) -> usize {
+        (index / cols - self.first[1]) * self.cols + index % cols - self.first[0]
     }
 
-    /// Column and row on the grid of a place of the window.
-    fn node(&self, place: usize) -> [usize; 2] {
-        [self.first[0] + place % self.cols, self.first[1] + place / self.cols]
+    /// Column and row on the grid of a node, given by its index in the window.
+    fn node(&self, index: usize) -> [usize; 2] {
+        [self.first[0] + index % self.cols, self.first[1] + index / self.cols]
     }
 }
 

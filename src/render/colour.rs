@@ -1,6 +1,6 @@
 //! Colours.
 
-/// An opaque colour: red, green, blue.
+/// An opaque colour: red, green, blue, each 0 to 255 (sRGB).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rgb(pub u8, pub u8, pub u8);
 

@@ -50,7 +50,7 @@ pub struct MapPicture<'a> {
     pub goals: Vec<DVec2>,
     /// The line above the map; empty for none.
     pub title: String,
-    /// Pixels of the map's longer side. Default: 1600.
+    /// Pixels of the map's longer side, 100 to 8192. Default: 1600.
     pub max_side_px: u32,
     /// Asked whether to cancel while the ground is painted.
     pub control: Control,

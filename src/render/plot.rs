@@ -46,7 +46,7 @@ pub struct LogPlot {
 }
 
 impl LogPlot {
-    /// Draws the plot.
+    /// Draws the plot, 1200 × 1200 pixels.
     ///
     /// # Errors
     /// [`Error::Argument`] for a coordinate that is negative or not finite.

@@ -36,7 +36,7 @@ pub struct SurfacePicture<'a> {
     pub view: DVec3,
     /// The line above the surface; empty for none.
     pub title: String,
-    /// Pixels of the picture's longer side. Default: 1600.
+    /// Pixels of the picture's longer side, 100 to 8192. Default: 1600.
     pub max_side_px: u32,
 }
 

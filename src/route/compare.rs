@@ -21,6 +21,7 @@ pub struct Comparison {
 
 impl Comparison {
     /// Solves every metric with `solver` from the nearest of `starts` over the whole grid and traces its route to `goal` (grid coordinates).
+    /// Cost: a solve and a route for each metric; all distances are kept.
     ///
     /// # Errors
     /// [`Error::NoPath`](crate::Error::NoPath), and those of [`Solver::solve`].

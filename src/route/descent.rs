@@ -19,7 +19,7 @@ pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
     let mut value = distance.stored_at(goal)?;
     let mut at = goal;
     let mut line = vec![goal];
-    let home = loop {
+    let start = loop {
         if let Some(foot) = distance.straight_foot(at, value) {
             break foot;
         }
@@ -34,10 +34,10 @@ pub(super) fn line(distance: &DistanceMap, goal: DVec2) -> Option<Vec<DVec2>> {
         line.push(at);
     };
     // Straight to the start in such steps too; a single one, of no length, if the goal is on the start.
-    let steps = (at.distance(home) / STEP).ceil().max(1.0);
-    line.extend((1..steps as usize).map(|i| at.lerp(home, i as f64 / steps)));
-    if home != at || line.len() == 1 {
-        line.push(home);
+    let steps = (at.distance(start) / STEP).ceil().max(1.0);
+    line.extend((1..steps as usize).map(|i| at.lerp(start, i as f64 / steps)));
+    if start != at || line.len() == 1 {
+        line.push(start);
     }
     line.reverse();
     Some(line)

@@ -61,13 +61,14 @@ pub(super) fn run(args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<
 /// A surface cut into regions.
 struct Subject<'a> {
     path: &'a Path,
-    ground: Ground,
+    source: Source,
     /// The finest level.
     level: Level,
     signatures: Vec<Signature>,
 }
 
-enum Ground {
+/// What the surface was read from.
+enum Source {
     Heights(Box<Scenario>, Box<Terrain>),
     Nurbs(Box<NurbsGrid>),
 }
@@ -79,16 +80,16 @@ impl<'a> Subject<'a> {
     /// A file that cannot be read or used; a flag that a NURBS surface cannot have.
     fn open(path: &'a Path, args: &'a MatchArgs, run: &RunArgs, control: &Control) -> Result<Self> {
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let (ground, sampled) = match is_json {
+        let (source, sampled) = match is_json {
             true => open_nurbs(path, args, control)?,
             false => open_dem(path, args, run, control)?,
         };
-        let surface = ground.surface();
+        let surface = source.surface();
         let solver = args.ground.metric.solver();
         let mut levels = cut(surface, sampled, &args.regions, solver, control)?.levels;
         let level = levels.pop().unwrap_or_default();
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
-        Ok(Self { path, ground, level, signatures })
+        Ok(Self { path, source, level, signatures })
     }
 
     fn record(&self) -> MatchedSurface {
@@ -98,8 +99,8 @@ impl<'a> Subject<'a> {
 
     /// The regions in their colours.
     fn picture(&self, colours: &[Rgb]) -> ridgeway::Result<RgbaImage> {
-        match &self.ground {
-            Ground::Heights(_, terrain) => {
+        match &self.source {
+            Source::Heights(_, terrain) => {
                 let outlines = outlines(&self.level, terrain.frame().cols());
                 let mut map = MapPicture::new(terrain.frame(), terrain.heights());
                 (map.title, map.max_side_px) = (title(self.path), PIXELS);
@@ -111,7 +112,7 @@ impl<'a> Subject<'a> {
                 });
                 map.render()
             }
-            Ground::Nurbs(surface) => {
+            Source::Nurbs(surface) => {
                 let labels = self.level.labels.iter();
                 let colours: Vec<_> =
                     labels.map(|l| l.map_or(Rgb::WHITE, |l| colours[l as usize])).collect();
@@ -127,14 +128,14 @@ impl<'a> Subject<'a> {
     fn seed(&self, region: usize) -> Vec<f64> {
         let [col, row] = self.level.regions[region].seed;
         let node = DVec2::new(col as f64, row as f64);
-        match &self.ground {
-            Ground::Heights(_, terrain) => terrain.frame().to_map(node).to_array().into(),
-            Ground::Nurbs(surface) => surface.space_jet(node).point.to_array().into(),
+        match &self.source {
+            Source::Heights(_, terrain) => terrain.frame().to_map(node).to_array().into(),
+            Source::Nurbs(surface) => surface.space_jet(node).point.to_array().into(),
         }
     }
 }
 
-fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Ground, Sampled)> {
+fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Source, Sampled)> {
     if let Some(flag) = args.ground.metric.dem_only_flag() {
         let name = path.display();
         return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
@@ -143,7 +144,7 @@ fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Groun
     let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
     let metric = args.ground.metric.metric(args.metric.unwrap_or(metric_named(CURVATURE)), None)?;
     let sampled = Sampled::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
-    Ok((Ground::Nurbs(Box::new(surface)), sampled))
+    Ok((Source::Nurbs(Box::new(surface)), sampled))
 }
 
 fn open_dem(
@@ -151,17 +152,17 @@ fn open_dem(
     args: &MatchArgs,
     run: &RunArgs,
     control: &Control,
-) -> Result<(Ground, Sampled)> {
+) -> Result<(Source, Sampled)> {
     let name = args.ground.metric.chosen(args.metric)?;
     let places = (&[][..], &[][..]);
     let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
     let sampled = Sampled::of(&metric, control)?;
     drop(metric);
-    Ok((Ground::Heights(Box::new(scenario), Box::new(terrain)), sampled))
+    Ok((Source::Heights(Box::new(scenario), Box::new(terrain)), sampled))
 }
 
-impl Ground {
+impl Source {
     fn surface(&self) -> &dyn Surface {
         match self {
             Self::Heights(scenario, _) => &scenario.surface,

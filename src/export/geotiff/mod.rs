@@ -25,6 +25,9 @@ const CLASSIC_BYTES: usize = 3 << 30;
 
 /// Writes `bands` on `frame`, which lies in `crs`, as one GeoTIFF, bands in separate planes.
 ///
+/// # Cost
+/// Some 25 ns of one core per value, on the current rayon pool; besides, one row of tiles in memory.
+///
 /// # Errors
 /// Those of `out`; `InvalidInput` if there is no band, bands differ in type, a band has not one value
 /// per node, or the grid exceeds TIFF's 32-bit sizes.

@@ -32,7 +32,7 @@ pub struct RegionRecord {
     pub region: usize,
     /// The region of the level above that it is part of.
     pub parent: Option<u32>,
-    /// Radius of its cluster.
+    /// Radius of its cluster, see [`Region::epsilon`].
     pub epsilon: f64,
     /// Unit of the radius.
     pub epsilon_unit: Unit,
@@ -110,7 +110,7 @@ pub struct MatchedPair {
     pub first: usize,
     /// Number of the region of the second surface.
     pub second: usize,
-    /// How unlike they are, 0 to 1.
+    /// How unlike they are, 0 to 1, see [`Match::distance`].
     pub unlikeness: f64,
     /// Size of the second as a multiple of the first's.
     pub size_ratio: f64,

@@ -4,8 +4,8 @@
 
 use glam::DVec2;
 
-use super::cut::Run;
 use super::extent::Size;
+use super::labelled_surface::Run;
 use super::moments::Moments;
 use super::tensors::{MISSING, Tensor, Tensors, squared_distance, sum};
 use crate::linalg::Sym2;
@@ -32,7 +32,7 @@ impl Kernel for AlongSurface<'_> {
     fn run(self) {
         let Self { tensors, sizes, run, moments } = self;
         let steps = run.of_regions(|region| STEP * sizes[region].side);
-        let first = run.node[1] * tensors.cut.cols + run.node[0];
+        let first = run.node[1] * tensors.labelled.cols + run.node[0];
         let changes = changes(tensors, run);
         let neighbours = neighbours(run, &steps, &changes);
         let cells = [0, 1, 2, 3].map(|k| tensors.cells(&neighbours[k]));
@@ -112,7 +112,7 @@ fn grid_differences(
 #[inline(always)]
 fn changes(tensors: &Tensors<'_>, run: &Run<'_>) -> [Lanes; 3] {
     let mut changes = [[0.0; BLOCK]; 3];
-    let first = run.node[1] * tensors.cut.cols + run.node[0];
+    let first = run.node[1] * tensors.labelled.cols + run.node[0];
     for (i, label) in run.labels.iter().enumerate() {
         let Some(region) = *label else { continue };
         let products = match tensors.cross(first + i, region) {

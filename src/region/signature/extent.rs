@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
-use super::cut::{Run, Sum};
+use super::labelled_surface::{Run, Sum};
 use crate::linalg::simd::Kernel;
 use crate::metric::PLANE_BEND;
 use crate::surface::{BLOCK, Forms};

@@ -8,17 +8,17 @@
 //! The paper's neighbours are those on the grid, so its numbers change with the sampling and when the grid is
 //! turned. Ours belong to the surface, see [`Neighbours::Surface`].
 
-mod cut;
 mod differences;
 mod extent;
+mod labelled_surface;
 mod moments;
 mod tensors;
 
 use serde::Serialize;
 
-use self::cut::Cut;
 use self::differences::{AlongSurface, along_grid};
 use self::extent::{Extent, Extents, Size};
+use self::labelled_surface::LabelledSurface;
 use self::moments::{Moments, eigenvalues};
 use self::tensors::Tensors;
 use crate::control::Control;
@@ -51,7 +51,7 @@ pub enum Neighbours {
 }
 
 impl Signature {
-    /// How unlike two shapes are, 0 to 1: `Σ |σ_i − σ'_i| / Σ (σ_i + σ'_i)` with `σ = √λ` (Bray and Curtis 1957). Sums below 1e-3
+    /// Dissimilarity of two shapes, 0 (alike) to 1: `Σ |σ_i − σ'_i| / Σ (σ_i + σ'_i)` with `σ = √λ` (Bray and Curtis 1957). Sums below 1e-3
     /// count as none: a surface that bends has some 1.
     #[must_use]
     pub fn distance(&self, other: &Self) -> f64 {
@@ -104,11 +104,13 @@ pub fn signatures(
             format!("below the number of nodes, {nodes}"),
         ));
     }
-    let cut = Cut { surface, cols, rows, periodic: surface.periodic(), labels, regions };
-    let extents = cut.sums(control, |run, extents| simd::dispatch(Extents { run, extents }))?;
+    let labelled =
+        LabelledSurface { surface, cols, rows, periodic: surface.periodic(), labels, regions };
+    let extents =
+        labelled.sums(control, |run, extents| simd::dispatch(Extents { run, extents }))?;
     let sizes: Vec<_> = extents.iter().map(Extent::size).collect();
-    let tensors = Tensors::new(&cut, &sizes, control)?;
-    let sums = cut.sums(control, |run, moments| match neighbours {
+    let tensors = Tensors::new(&labelled, &sizes, control)?;
+    let sums = labelled.sums(control, |run, moments| match neighbours {
         Neighbours::Surface => {
             simd::dispatch(AlongSurface { tensors: &tensors, sizes: &sizes, run, moments });
         }

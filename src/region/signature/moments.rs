@@ -1,6 +1,6 @@
 //! Moments of the differences over a region, and the eigenvalues of their covariance.
 
-use super::cut::Sum;
+use super::labelled_surface::Sum;
 
 /// Weighted sums of vectors and of their products.
 #[derive(Clone, Copy, Default)]

@@ -1,12 +1,12 @@
-//! The curvature tensor in space at the nodes of a cut surface.
+//! The curvature tensor in space at the nodes of a labelled surface.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::cut::{Cut, Run};
 use super::extent::Size;
+use super::labelled_surface::{LabelledSurface, Run};
 use crate::control::Control;
 use crate::error::Result;
 use crate::linalg::bilinear::{CORNERS, corner_weights};
@@ -36,7 +36,7 @@ pub(super) fn squared_distance(a: &Tensor, b: &Tensor) -> f64 {
 
 /// The curvature tensor at the nodes, with the `δ` of their region.
 pub(super) struct Tensors<'a> {
-    pub(super) cut: &'a Cut<'a>,
+    pub(super) labelled: &'a LabelledSurface<'a>,
     /// Not finite where the surface is degenerate, 0 at nodes of no region.
     of: Vec<Tensor>,
     /// Whether each node is the first corner of a cell inside a region.
@@ -44,34 +44,38 @@ pub(super) struct Tensors<'a> {
 }
 
 impl<'a> Tensors<'a> {
-    pub(super) fn new(cut: &'a Cut<'a>, sizes: &[Size], control: &Control) -> Result<Self> {
-        let mut of = vec![[0.0; 6]; cut.labels.len()];
-        of.par_chunks_mut(cut.cols.max(1) * BLOCK).enumerate().for_each(|(band, of)| {
-            cut.visit(band * BLOCK, control, |run| {
+    pub(super) fn new(
+        labelled: &'a LabelledSurface<'a>,
+        sizes: &[Size],
+        control: &Control,
+    ) -> Result<Self> {
+        let mut of = vec![[0.0; 6]; labelled.labels.len()];
+        of.par_chunks_mut(labelled.cols.max(1) * BLOCK).enumerate().for_each(|(band, of)| {
+            labelled.visit(band * BLOCK, control, |run| {
                 let deltas = run.of_regions(|region| sizes[region].delta);
-                let first = run.node[1] % BLOCK * cut.cols + run.node[0];
+                let first = run.node[1] % BLOCK * labelled.cols + run.node[0];
                 let tensors = &mut of[first..][..run.labels.len()];
                 simd::dispatch(CurvatureTensors { run, deltas: &deltas, tensors });
             });
         });
         control.check()?;
-        Ok(Self { cut, of, inner: cut.inner_cells() })
+        Ok(Self { labelled, of, inner: labelled.inner_cells() })
     }
 
     /// The tensor at a column and row in or beside the grid; `None` unless the node belongs to the region.
     pub(super) fn at(&self, col: isize, row: isize, region: u32) -> Option<&Tensor> {
-        let node = self.cut.node(col, row)?;
-        (self.cut.labels[node] == Some(region)).then(|| &self.of[node])
+        let node = self.labelled.node(col, row)?;
+        (self.labelled.labels[node] == Some(region)).then(|| &self.of[node])
     }
 
     /// The tensors after and before a node of a region along columns and along rows, if all four neighbours belong to
     /// it and lie in the grid.
     #[inline(always)]
     pub(super) fn cross(&self, node: usize, region: u32) -> Option<[[&Tensor; 2]; 2]> {
-        let cols = self.cut.cols;
+        let cols = self.labelled.cols;
         let before = node.checked_sub(cols + 1)?;
         let is_inner =
-            self.inner[node] && self.inner[before] && self.cut.labels[before] == Some(region);
+            self.inner[node] && self.inner[before] && self.labelled.labels[before] == Some(region);
         is_inner.then(|| {
             let of = |node: usize| &self.of[node];
             [[of(node + 1), of(node - 1)], [of(node + cols), of(node - cols)]]
@@ -82,7 +86,7 @@ impl<'a> Tensors<'a> {
     /// the grid and beyond it.
     #[inline(always)]
     pub(super) fn cells(&self, [cols, rows]: &[Lanes; 2]) -> Lanes {
-        let (width, height) = (self.cut.cols as f64, self.cut.rows as f64);
+        let (width, height) = (self.labelled.cols as f64, self.labelled.rows as f64);
         let mut cells = [MISSING; BLOCK];
         for i in 0..BLOCK {
             let (col, row) = (cols[i].floor(), rows[i].floor());
@@ -98,8 +102,8 @@ impl<'a> Tensors<'a> {
     #[inline(always)]
     pub(super) fn squared_distance(&self, node: usize, cell: f64, at: DVec2, region: u32) -> f64 {
         let (cell, is_cell) = (cell as usize, cell >= 0.0);
-        if is_cell && self.inner[cell] && self.cut.labels[cell] == Some(region) {
-            let (a, b) = (&self.of[cell..][..2], &self.of[cell + self.cut.cols..][..2]);
+        if is_cell && self.inner[cell] && self.labelled.labels[cell] == Some(region) {
+            let (a, b) = (&self.of[cell..][..2], &self.of[cell + self.labelled.cols..][..2]);
             let (here, [p, q, r, s]) = (&self.of[node], corner_weights(at - at.floor()));
             let mut squares = [0.0; 6];
             for k in 0..6 {

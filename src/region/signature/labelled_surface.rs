@@ -1,4 +1,4 @@
-//! A surface cut into regions, and sums over them.
+//! A surface whose nodes are labelled by region, and sums over them.
 
 use rayon::prelude::*;
 
@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::grid::tiling::wrap;
 use crate::surface::{BLOCK, Block, JetBlock, Lanes, SpaceLanes, Surface};
 
-/// A surface cut into regions.
-pub(super) struct Cut<'a> {
+/// A surface whose nodes are labelled by region.
+pub(super) struct LabelledSurface<'a> {
     pub(super) surface: &'a dyn Surface,
     pub(super) cols: usize,
     pub(super) rows: usize,
@@ -42,7 +42,7 @@ impl Run<'_> {
     }
 }
 
-impl Cut<'_> {
+impl LabelledSurface<'_> {
     /// Goes through the nodes of [`BLOCK`] rows from row `first` on, run by run: from left to right in each row.
     pub(super) fn visit(&self, first: usize, control: &Control, mut visit: impl FnMut(&Run<'_>)) {
         let mut run = Run { node: [0; 2], labels: &[], jets: SpaceLanes::default() };
