@@ -3,8 +3,8 @@
 use crate::error::{Error, Result};
 use crate::surface::{Measures, Surface};
 
-/// A surface that bends by no more than this, as curvature times extent, counts as a plane. A plane of 4000² cells of 30 m with heights in `f32` is fitted,
-/// by the defaults, with 5e-4 of rounding.
+/// A surface that bends by no more than this, as curvature times extent, counts as a plane. A plane of 4000² cells of 30 m with
+/// heights in `f32` bends by 5e-4 when fitted by the defaults, all of it rounding.
 pub(crate) const PLANE_BEND: f64 = 1e-3;
 
 /// The offset `δ` of the curvature tensor, 1/m. A step along a principal direction costs `√(δ + |κ|)` per metre, so the smaller `δ`
@@ -23,7 +23,7 @@ impl Delta {
     /// Default share of the root-mean-square curvature.
     pub const DEFAULT_SHARE: f64 = 0.1;
 
-    /// The number that the user gave.
+    /// The share or the curvature, checked.
     ///
     /// # Errors
     /// It is not positive and finite.

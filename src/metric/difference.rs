@@ -108,7 +108,8 @@ impl Difference {
     /// [`norm`](Metric::norm) makes of it, and 32 bytes per node.
     ///
     /// # Errors
-    /// A `δ` of the curvature tensor out of range; cancelled.
+    /// [`Error::Argument`](crate::Error::Argument) for a `δ` of the curvature tensor that is not positive and finite;
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn changes(&self, surface: &dyn Surface, control: &Control) -> Result<Vec<Change>> {
         self.changes_under(self.curvature_delta.on(surface)?, surface, control)
     }
@@ -144,7 +145,7 @@ impl Metric for Difference {
 
     /// `D` is not finite where the surface is degenerate; voids have the tensor of the continued surface.
     fn norm(&self, surface: &dyn Surface, control: &Control) -> Result<Norm> {
-        // The share if it is one; checked before the work.
+        // Checked before the work.
         let number = self.delta.number()?;
         let curvature_delta = self.curvature_delta.on(surface)?;
         let changes = self.changes_under(curvature_delta, surface, control)?;
@@ -300,7 +301,8 @@ impl Neighbourhood<'_> {
     }
 
     /// A derivative in space whose tangential part is `∇C` along `u_j`: central, one-sided where a neighbour is missing, 0 where both
-    /// are. A chord to one side has a part of first order in the tangent plane only because that turns: it is turned back.
+    /// are. A chord to one side has a part of first order in the tangent plane only because that turns, so the neighbour's tensor is
+    /// transported back.
     fn derivative(&self, j: usize) -> DMat3 {
         let here = self.here;
         match (self.neighbours[2 * j], self.neighbours[2 * j + 1]) {

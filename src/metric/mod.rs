@@ -107,14 +107,15 @@ pub trait Metric: fmt::Debug + Send + Sync {
     /// computed.
     ///
     /// # Errors
-    /// Parameters out of range, data that do not fit the surface; cancelled.
+    /// [`Error::Argument`](crate::Error::Argument) for parameters out of range and data that do not fit the surface;
+    /// [`Error::Cancelled`](crate::Error::Cancelled).
     fn norm(&self, surface: &dyn Surface, control: &Control) -> Result<Norm>;
 
     /// The metric bound to a surface. Voids of the surface are barriers.
     ///
     /// # Errors
-    /// Those of [`norm`](Self::norm); a climb weight or slope out of range; a raster whose size is not the surface's; a cost that
-    /// is finite but not positive, or costs too far apart.
+    /// Those of [`norm`](Self::norm); [`Error::Argument`](crate::Error::Argument) for a climb weight or slope out of range, a raster
+    /// whose size is not the surface's, a cost that is finite but not positive, or costs too far apart.
     fn on<'a>(
         &self,
         surface: &'a dyn Surface,

@@ -248,6 +248,7 @@ pub(super) fn averse_to_climb(
     ((d + along * (climb_weight * det)) * inverse, det * inverse)
 }
 
+/// Refuses costs of another number than nodes, costs that are not above 0, and costs too far apart.
 fn check_costs(surface: &dyn Surface, costs: &[f32]) -> Result<()> {
     let (cols, nodes) = (surface.cols(), surface.cols() * surface.rows());
     if costs.len() != nodes {

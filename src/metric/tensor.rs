@@ -40,7 +40,7 @@ impl Metric for Tensor {
     }
 
     /// # Errors
-    /// Tensors that are not one per node; one that is finite but not positive definite.
+    /// [`Error::Argument`] if there is not one tensor per node, or one is finite but not positive definite.
     fn norm(&self, surface: &dyn Surface, _: &Control) -> Result<Norm> {
         check_tensors(surface, &self.tensors)?;
         let tensors = Arc::clone(&self.tensors);
@@ -48,6 +48,7 @@ impl Metric for Tensor {
     }
 }
 
+/// Refuses tensors of another number than nodes, and finite ones that are not positive definite.
 fn check_tensors(surface: &dyn Surface, tensors: &[Sym2]) -> Result<()> {
     let (cols, rows) = (surface.cols(), surface.rows());
     if tensors.len() != cols * rows {

@@ -134,13 +134,15 @@ impl Axis {
     /// Trace of the matrix that takes heights to fitted heights.
     pub(in crate::surface) fn trace(&self, cells: f64) -> f64 {
         let inverse = self.normal(&self.penalty(3), cells).inverse_band();
-        let form = |node: &Local| -> f64 {
-            let weights = &node.weights[0][..self.basis.support()];
-            let entry = |i: usize, j: usize| inverse[node.start + i.max(j)][i.abs_diff(j)];
-            let row = |i: usize| (0..weights.len()).map(move |j| weights[j] * entry(i, j));
-            (0..weights.len()).map(|i| weights[i] * row(i).sum::<f64>()).sum()
-        };
-        self.nodes.iter().map(form).sum()
+        self.nodes.iter().map(|node| self.leverage(node, &inverse)).sum()
+    }
+
+    /// Share of a node's height in its fitted height, `vᵀ N⁻¹ v` with `v` the weights at the node, from the band of `N⁻¹`.
+    fn leverage(&self, node: &Local, inverse: &[[f64; SUPPORT]]) -> f64 {
+        let weights = &node.weights[0][..self.basis.support()];
+        let entry = |i: usize, j: usize| inverse[node.start + i.max(j)][i.abs_diff(j)];
+        let row = |i: usize| (0..weights.len()).map(move |j| weights[j] * entry(i, j));
+        (0..weights.len()).map(|i| weights[i] * row(i).sum::<f64>()).sum()
     }
 
     /// Right-hand side of the normal equations: `Σ_i v_i z_i`.

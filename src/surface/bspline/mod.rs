@@ -1,8 +1,8 @@
 //! Tensor-product B-splines: least squares along rows and then columns.
 //!
 //! [`basis`] has the splines of one axis, [`banded`] the solver, [`fit`] the fit and its derivatives, [`voids`] the heights
-//! that have no weight, [`knots`] knots and smoothing, [`selection`] their choice by the data; [`block`] evaluates many nodes at once, [`residuals`] says
-//! how well a surface fits.
+//! that have no weight, [`knots`] knots and smoothing, [`selection`] their choice by the data; [`block`] evaluates many nodes
+//! at once, [`residuals`] says how well a surface fits.
 
 pub(in crate::surface) mod banded;
 pub(in crate::surface) mod basis;

@@ -44,7 +44,7 @@ impl HeightSurface {
     /// Fits a terrain. Voids have no weight.
     ///
     /// # Errors
-    /// All void; a cut-off or tolerance that is not positive and finite; cancelled.
+    /// [`Error::Argument`] if all heights are void, or a cut-off or tolerance is not positive and finite; [`Error::Cancelled`].
     pub fn fit(terrain: &Terrain, options: &FitOptions, control: &Control) -> Result<Self> {
         Self::fit_heights(terrain.frame().clone(), terrain.heights(), options, control)
     }

@@ -69,7 +69,7 @@ impl NurbsCurve {
     /// `x` and `y` are orthogonal and of one length.
     ///
     /// # Errors
-    /// A coordinate out of range.
+    /// [`Error::Argument`] for a coordinate out of range.
     pub fn ellipse(centre: DVec3, x: DVec3, y: DVec3) -> Result<Self> {
         Self::new(ring_knots()?, true, &ring(centre, x, y))
     }
@@ -80,14 +80,14 @@ impl NurbsCurve {
         self.knots.domain()
     }
 
-    /// The point at a parameter, which is moved into the domain.
+    /// The point at a parameter, which is moved into the domain, m.
     #[must_use]
     pub fn point(&self, u: f64) -> DVec3 {
         let p = self.homogeneous_at(u);
         p.xyz() / p.w
     }
 
-    /// The derivative by the parameter.
+    /// The derivative by the parameter, m per unit of it.
     #[must_use]
     pub fn tangent(&self, u: f64) -> DVec3 {
         let (p, slope) = (self.homogeneous_at(u), self.derivative(u, 1));

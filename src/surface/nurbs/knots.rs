@@ -89,7 +89,7 @@ impl Knots {
     /// Equally spaced knots over 0 to 1 whose spline begins at the first of `controls` control points and ends at the last.
     ///
     /// # Errors
-    /// A degree out of range, fewer than `degree + 1` control points or more than [`MAX_CONTROLS`](Self::MAX_CONTROLS).
+    /// [`Error::Argument`] for a degree out of range, fewer than `degree + 1` control points or more than [`MAX_CONTROLS`](Self::MAX_CONTROLS).
     pub fn clamped(degree: usize, controls: usize) -> Result<Self> {
         if controls <= degree || controls > Self::MAX_CONTROLS {
             return Err(Error::argument(

@@ -177,7 +177,7 @@ impl NurbsSurface {
     /// The same surface with one more knot, at `u`, in a direction (0 or 1).
     ///
     /// # Errors
-    /// A `u` that is not inside the domain or is a knot of full multiplicity already.
+    /// [`Error::Argument`] for a `u` that is not inside the domain or is a knot of full multiplicity already.
     ///
     /// # Panics
     /// If the direction is not 0 or 1.
@@ -191,7 +191,8 @@ impl NurbsSurface {
     /// for a ratio `c` below 1, at the beginning for one above; their density changes by `c²` from end to end.
     ///
     /// # Errors
-    /// A ratio that is not above 0, or so far from 1 that weights leave their range or a knot outside the domain goes to infinity.
+    /// [`Error::Argument`] for a ratio that is not above 0, or so far from 1 that weights leave their range or a knot outside the
+    /// domain goes to infinity.
     ///
     /// # Panics
     /// If the direction is not 0 or 1.

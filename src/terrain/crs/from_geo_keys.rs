@@ -104,12 +104,7 @@ impl GeoKeys {
             self.short(key).filter(|c| (base..base + 1000).contains(c)).map(|c| c - base + 4000)
         };
         let code = coded(key::GEOGRAPHIC_CRS, 4000).or_else(|| coded(key::GEODETIC_DATUM, 6000));
-        let tokens = |code| {
-            let definition = crs_definitions::from_code(code)?.proj4;
-            let rest = definition.strip_prefix("+proj=longlat ")?;
-            Some(rest.trim_end_matches("+no_defs").trim().to_owned())
-        };
-        if let Some(known) = code.and_then(tokens) {
+        if let Some(known) = code.and_then(datum_of_crs) {
             return Some((known, None));
         }
         let semi_major = self.double(key::SEMI_MAJOR).filter(|a| a.is_finite() && *a > 0.0);
@@ -121,7 +116,7 @@ impl GeoKeys {
             (Some(a), Some(rf), _) if rf > 1.0 => format!("+a={a} +rf={rf}"),
             (Some(a), _, Some(b)) if b > 0.0 && b < a => format!("+a={a} +b={b}"),
             (Some(a), ..) => format!("+R={a}"),
-            (None, ..) => tokens(coded(key::ELLIPSOID, 7000)?)?,
+            (None, ..) => datum_of_crs(coded(key::ELLIPSOID, 7000)?)?,
         };
         let on_earth = semi_major.is_none_or(|a| (a - 6_371_000.0).abs() < 20_000.0);
         let caveat = "the file does not name its datum; longitudes and latitudes may be some hundred metres off";
@@ -153,6 +148,13 @@ impl GeoKeys {
             [key::EASTING, key::NORTHING].map(|k| first(&k).unwrap_or(0.0) * metres_per_unit);
         Some(format!("{method} +lon_0={lon_0} +k={scale} +x_0={x_0} +y_0={y_0}"))
     }
+}
+
+/// The ellipsoid and datum shift of a geographic CRS in PROJ.4 notation, by its EPSG code.
+fn datum_of_crs(code: u16) -> Option<String> {
+    let definition = crs_definitions::from_code(code)?.proj4;
+    let rest = definition.strip_prefix("+proj=longlat ")?;
+    Some(rest.trim_end_matches("+no_defs").trim().to_owned())
 }
 
 #[cfg(test)]

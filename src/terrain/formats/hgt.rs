@@ -82,18 +82,19 @@ fn read_tile(path: &Path, bytes: &[u8]) -> Result<Raster> {
 /// `N42E001…` is 42° N, 1° E.
 fn south_west_corner(path: &Path) -> Option<DVec2> {
     let name = path.file_name()?.to_str()?.to_ascii_uppercase();
-    let number = |from: usize, to: usize| -> Option<f64> {
-        let digits = name.get(from..to).filter(|d| d.bytes().all(|b| b.is_ascii_digit()))?;
-        digits.parse().ok()
-    };
-    let sign = |at: usize, positive: u8, negative: u8| match name.as_bytes().get(at)? {
-        b if *b == positive => Some(1.0),
-        b if *b == negative => Some(-1.0),
-        _ => None,
-    };
-    let lat = sign(0, b'N', b'S')? * number(1, 3)?;
-    let lon = sign(3, b'E', b'W')? * number(4, 7)?;
+    let lat = degrees(name.get(..3)?, 'N', 'S')?;
+    let lon = degrees(name.get(3..7)?, 'E', 'W')?;
     Some(DVec2::new(lon, lat))
+}
+
+/// `W002` is −2 where `E` is positive and `W` negative.
+fn degrees(text: &str, positive: char, negative: char) -> Option<f64> {
+    let (sign, digits) = match text.strip_prefix(positive) {
+        Some(digits) => (1.0, digits),
+        None => (-1.0, text.strip_prefix(negative)?),
+    };
+    let is_number = digits.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| digits.parse::<f64>().ok()).flatten().map(|number| sign * number)
 }
 
 /// Unpacks a gzip.
