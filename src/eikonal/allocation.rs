@@ -30,38 +30,39 @@ impl DistanceMap {
             while labels[at] == UNKNOWN {
                 labels[at] = PENDING;
                 path.push(at);
-                match self.beside(at % cols, at / cols, predecessors[at]) {
+                match self.ring_node(at % cols, at / cols, predecessors[at]) {
                     Some((col, row)) => at = row * cols + col,
                     None => labels[at] = NONE,
                 }
             }
-            // A path in a circle, where a step is lost in the rounding of the values, leads nowhere.
+            // Paths may be circular where a step is lost in the rounding of the values; then there is no region.
             let label = if labels[at] == PENDING { NONE } else { labels[at] };
             path.drain(..).for_each(|node| labels[node] = label);
         }
         labels.into_iter().map(|label| (label < NONE).then_some(label)).collect()
     }
 
-    /// The labels of the nodes that kept their start value, but for a little.
+    /// The labels of the nodes whose value is a start value, within rounding.
     fn seed_labels(&self) -> Vec<u32> {
-        /// As a share of a cell: the updates beside a start gain 1e-4 or so by rounding.
-        const LITTLE: f64 = 0.01;
+        /// As a share of a cell: updates next to a start lower values by 1e-4 or so through rounding.
+        const ROUNDING_CELLS: f64 = 0.01;
         let mut labels = vec![UNKNOWN; self.cols() * self.rows()];
         let seeds = |col: usize, row: usize, seed: f32, region: u32| {
             let label = &mut labels[row * self.cols() + col];
             let Some(metric) = self.field.metric(col, row) else { return };
-            let most = ROUNDED_UP * self.stored(col, row) + LITTLE * metric.det().sqrt().sqrt();
+            let most =
+                ROUNDED_UP * self.stored(col, row) + ROUNDING_CELLS * metric.det().sqrt().sqrt();
             if self.is_reached(col, row) && f64::from(seed) <= most {
                 *label = region.min(*label);
             }
         };
-        // The map was seeded the same way without error.
+        // Cannot fail: the map was made with the same start values.
         let _ = source::seed_all(&self.field, &self.starts, seeds);
         labels
     }
 
     /// The node at a place of the [`RING`].
-    fn beside(&self, col: usize, row: usize, place: u8) -> Option<(usize, usize)> {
+    fn ring_node(&self, col: usize, row: usize, place: u8) -> Option<(usize, usize)> {
         let (i, j) = *RING.get(usize::from(place))?;
         self.field.tiling.node(col as isize + i as isize, row as isize + j as isize)
     }

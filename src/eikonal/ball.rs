@@ -1,8 +1,8 @@
-//! Geodesic balls: the nodes within a distance of one.
+//! Geodesic balls: the nodes within a distance of a node.
 //!
 //! A segmentation needs thousands of small ones. So the memory of a solve is made once, for the whole grid, and only what a ball
-//! reaches is touched: a tile is *opened*, that is given the values it has before a front comes, when it or a tile beside it is first
-//! solved, and put back before the next ball. The equation is that of a solve of the whole field with the same stop, the factor around the
+//! reaches is touched: a tile is *opened*, that is, given the values it has before the solve, when it or a neighbour is first
+//! solved, and reset before the next ball. The equation is that of a solve of the whole field with the same stop, the factor around the
 //! node included.
 
 use std::iter::once;
@@ -34,13 +34,13 @@ pub(crate) struct Balls<'a> {
     /// Start values of the ball, and the tiles that have some.
     seeds: Vec<Option<Box<Seeds>>>,
     seeded: Vec<usize>,
-    /// The tiles that were solved, and those beside them.
+    /// The tiles that were solved, and their neighbours.
     opened: Vec<usize>,
     is_open: Vec<bool>,
 }
 
 impl<'a> Balls<'a> {
-    /// Takes at most 0.2 ms per million nodes, for memory of 4 bytes per node that has to be zero; what comes fresh from the system is.
+    /// Takes at most 0.2 ms per million nodes, for 4 bytes of zeroed memory per node, which the system may have ready.
     pub(crate) fn new(field: &'a TensorField) -> Self {
         let tiles = field.tiling.tiles();
         Self {
@@ -55,7 +55,7 @@ impl<'a> Balls<'a> {
     }
 
     /// The open nodes within `radius` (unit of the metric) of a node of the field, as places in the row-major grid, in ascending
-    /// order, each with its distance: what [`Stop::Distance`] leaves. None if the node is closed.
+    /// order, each with its distance: what [`Stop::Distance`] reports. None if the node is closed.
     ///
     /// # Errors
     /// As [`Solver::solve_field`].
@@ -102,8 +102,8 @@ impl<'a> Balls<'a> {
         }
         let open = |jobs: &[u64], store: &MemoryStore| {
             let solved = jobs.iter().map(|&job| Job::from_bits(job).tile as usize);
-            let beside = |tile| field.tiling.neighbours(tile).map(|(_, n)| n);
-            for tile in solved.flat_map(|tile| once(tile).chain(beside(tile))) {
+            let neighbours = |tile| field.tiling.neighbours(tile).map(|(_, n)| n);
+            for tile in solved.flat_map(|tile| once(tile).chain(neighbours(tile))) {
                 if !is_open[tile] {
                     is_open[tile] = true;
                     opened.push(tile);
@@ -115,7 +115,7 @@ impl<'a> Balls<'a> {
         schedule.run(&equation, Rule::Lower, stop, open, control)
     }
 
-    /// Puts back what the last ball touched.
+    /// Resets what the last ball touched.
     fn clear(&mut self) {
         self.schedule.clear(&self.opened);
         self.opened.iter().for_each(|&tile| self.schedule.store.forget_limits(tile));
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn only_tiles_that_a_ball_reaches_and_those_beside_them_are_touched() {
+    fn only_tiles_that_a_ball_reaches_and_their_neighbours_are_touched() {
         let field = wave(400, 400);
         // Nodes that are solved and that are read, for each one held.
         for (radius, most) in [(5.0, [13.0, 55.0]), (20.0, [2.8, 7.0]), (80.0, [1.4, 2.0])] {

@@ -1,4 +1,4 @@
-//! Steps through a single cell, for lines that must not cross walls.
+//! Steps of a route through a single cell, where interpolation across walls would mislead.
 
 use glam::DVec2;
 
@@ -7,8 +7,8 @@ use super::source::has_line_of_sight;
 use super::stencil::segment::segment;
 
 impl DistanceMap {
-    /// The best point on the border of the cells around `at`: the solver's update with `at` as the node. `None` if the
-    /// distance there is not lower than `value`.
+    /// The best point on the border of the cells around `at`, by the update of the solver with `at` as the node, and its stored distance. `None`
+    /// if no point in sight has a distance below `value`.
     pub(crate) fn descend_to_border(&self, at: DVec2, value: f64) -> Option<(DVec2, f64)> {
         let metric = self.field.metric_at(at)?;
         let mut best: Option<(f64, DVec2, f64)> = None;
@@ -50,7 +50,7 @@ impl DistanceMap {
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Sides of the cells that touch `at`, without those it lies on.
+    /// Edges of the cells that touch `at`, except those it lies on.
     fn borders(&self, at: DVec2) -> impl Iterator<Item = ((isize, isize), (isize, isize))> + '_ {
         let tiling = &self.field.tiling;
         let span =
@@ -74,7 +74,7 @@ impl DistanceMap {
     }
 }
 
-/// Steps shorter than this, in cells, are no progress.
+/// Shortest step, in cells.
 const MIN_STEP: f64 = 1e-6;
 
 fn point((col, row): (isize, isize)) -> DVec2 {

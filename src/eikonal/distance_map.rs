@@ -1,4 +1,4 @@
-//! Distances at the nodes: what a solve comes to.
+//! Distances at the nodes: the result of a solve.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -20,11 +20,11 @@ use crate::metric::Unit;
 pub struct DistanceMap {
     pub(crate) field: TensorField,
     pub(super) factors: Factors,
-    /// First order.
+    /// First-order values.
     pub(super) values: Values,
-    /// What is to be added to them, in high accuracy.
+    /// What is to be added to them; `None` unless in high accuracy.
     pub(super) correction: Option<Correction>,
-    /// What is known of each tile, for going on.
+    /// What is known of each tile, for continuing the solve.
     pub(super) limits: Vec<Limits>,
     pub(super) starts: Box<[StartRegion]>,
     pub(super) statistics: Statistics,
@@ -86,7 +86,7 @@ impl DistanceMap {
     }
 
     /// Gradient of the distance at grid coordinates, in ground axes (x east, y north), per metre; `None` where
-    /// [`at`](Self::at) is. By differences over half a cell, one-sided beside walls and borders.
+    /// [`at`](Self::at) is. By differences over half a cell, one-sided next to walls and borders.
     #[must_use]
     pub fn gradient_at(&self, at: DVec2) -> Option<DVec2> {
         const REACH: f64 = 0.25;
@@ -122,8 +122,8 @@ impl DistanceMap {
         (DVec2::new(-foot.x, foot.y) * spacing).try_normalize()
     }
 
-    /// Step in grid coordinates from a node, as in [`reached`](Self::reached), to the point of its ring that its value came
-    /// from.
+    /// Step in grid coordinates from a node, given as in [`reached`](Self::reached), to the point that its value came from: of a start
+    /// region, or of its ring.
     pub(crate) fn foot(&self, col: isize, row: isize) -> Option<DVec2> {
         let value = self.reached(col, row)?;
         let (col, row) = self.field.tiling.node(col, row)?;
@@ -134,17 +134,17 @@ impl DistanceMap {
         self.best_foot(col, row).map(|(_, foot)| foot)
     }
 
-    /// Least value of a node over its ring, and the step to the point of the ring it came from.
+    /// Least value of a node over its ring, and the step to the point of the ring at which it is attained.
     pub(super) fn best_foot(&self, col: usize, row: usize) -> Option<(f64, DVec2)> {
         predecessor::best_foot(&self.field, &self.factors, |c, r| self.value(c, r), col, row)
     }
 
-    /// The values, if they have a correction that must follow when they change.
-    pub(super) fn to_correct(&self) -> Option<Values> {
+    /// A copy of the first-order values, if they have a correction, which must be updated where they change.
+    pub(super) fn values_if_corrected(&self) -> Option<Values> {
         self.correction.is_some().then(|| self.values.clone())
     }
 
-    /// Which tiles have other values than before; none, if there is nothing to correct.
+    /// Which tiles have other values than `before`; none, if there was no correction.
     pub(super) fn differing(&self, before: Option<Values>) -> Vec<bool> {
         let tiles = self.field.tiling.tiles();
         let Some(before) = before else { return vec![false; tiles] };
@@ -179,7 +179,7 @@ impl DistanceMap {
         self.values.get(col, row) < UNREACHED
     }
 
-    /// Stored value at a node, counted on around the grid where it is periodic; `None` outside and where not reached.
+    /// Stored value at a node, modulo the size of the grid where it is periodic; `None` outside and where not reached.
     pub(crate) fn reached(&self, col: isize, row: isize) -> Option<f64> {
         let (col, row) = self.field.tiling.node(col, row)?;
         self.is_reached(col, row).then(|| self.stored(col, row))

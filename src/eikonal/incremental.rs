@@ -1,9 +1,9 @@
-//! Solving again after an edit of the field, only as far as the edit is felt.
+//! Solving again after an edit of the field, only where the edit changes something.
 //!
-//! A node's value is still true if it is *supported*: if the update from its ring gives no more. So the nodes that
-//! changed are forgotten, then all that are no longer supported, in the order in which changes travel, until none is left
-//! ([`Rule::Forget`](super::tile::kernel::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower by a
-//! step than anything its ring offers. What is left is true or too high, so that the ordinary solve, going on from
+//! A node's value is still true if it is *supported*: if the update from its ring gives no more. So the values of the nodes that
+//! were edited are forgotten, then all that are no longer supported, in the order in which changes travel, until none is left
+//! ([`Rule::Forget`](super::tile::kernel::Rule)). Nodes cannot support each other in a circle: the least value that is not true is lower, by the
+//! length of a step, than the update from its ring. What is left is true or too high, so that the ordinary solve, continued from
 //! the nodes that were forgotten, ends where one from the beginning would.
 
 use rayon::prelude::*;
@@ -29,8 +29,8 @@ impl Solver {
     /// The outcome is that of a solve from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was done.
     ///
     /// Costs the sampling of the metric and a comparison of all tensors; [`update_nodes`](Self::update_nodes) costs
-    /// neither. All is solved again where the ground around a start changed so that another factor is taken out there, or next to a
-    /// start that another path passes over.
+    /// neither. Everything is solved again if the metric around a start changed so that its factor is different, or if the change
+    /// reaches a start on which a shorter path from another start arrives.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -63,11 +63,11 @@ impl Solver {
             *old = field;
             Ok(changed)
         };
-        self.after(exchange, map, stop, control)
+        self.solve_after(exchange, map, stop, control)
     }
 
-    /// [`update`](Self::update) for single nodes: (column, row, tensor in index coordinates), `None` to close the node. The cost is that
-    /// of what is solved again, and some ns per node of the grid.
+    /// [`update`](Self::update) for single nodes: (column, row, tensor in index coordinates), `None` to close the node. Costs
+    /// what is solved again, and some ns per node of the grid.
     ///
     /// # Errors
     /// As [`solve`](Self::solve); [`Error::Argument`](crate::Error::Argument) if a node is not on the grid.
@@ -85,11 +85,11 @@ impl Solver {
             };
             nodes.iter().map(set).collect()
         };
-        self.after(set, map, stop, control)
+        self.solve_after(set, map, stop, control)
     }
 
-    /// The distances after an edit of the field, which says the tile and the place in it of the nodes it changed.
-    fn after(
+    /// The distances after an edit of the field, which returns the tile and the place in it of the nodes it changed.
+    fn solve_after(
         &self,
         edit: impl FnOnce(&mut TensorField) -> Result<Vec<(usize, usize)>>,
         mut map: DistanceMap,
@@ -105,15 +105,15 @@ impl Solver {
             return self.solve_again(map, stop, control);
         }
         let contested = contested(&map.values, &before);
-        let uncorrected = map.to_correct();
-        let lost = clear(&mut map, &changed);
+        let uncorrected = map.values_if_corrected();
+        let lost = forget(&mut map, &changed);
         let equation = Equation {
             field: &map.field,
             factors: &map.factors,
             seeds: &seeds,
             tolerance: self.tolerance,
         };
-        // This converges: a tile is looked at again only where a node of it or around it was forgotten.
+        // This converges: a tile is activated only after a node in it or next to it was forgotten, and no node is forgotten twice.
         let changes = Changes::Lost(&lost);
         let left =
             solution::solve(&equation, map.values, map.limits, changes, &Stop::Never, control)?;
@@ -125,7 +125,7 @@ impl Solver {
         if contested.iter().any(is_touched) {
             return self.solve_again(map, stop, control);
         }
-        let map = self.go_on(map, &lost, &seeds, stop, control)?;
+        let map = self.continue_from(map, &lost, &seeds, stop, control)?;
         let mut differing = map.differing(uncorrected);
         changed.iter().for_each(|&(tile, _)| differing[tile] = true);
         let map = self.correct(map, &seeds, &differing, control)?;
@@ -167,10 +167,10 @@ fn moved_seeds<'a>(
     })
 }
 
-/// The tiles in and beside which a start is passed over by a quicker path, with how many nodes of each have a value.
+/// The tiles in and next to which a node of a start has a shorter path from another start, with how many nodes of each have a value.
 ///
-/// Such a node jumps down from its own value, see [`ceiling`](super::tile::coefficients::ceiling). On obtuse metrics it may then hold up the very nodes
-/// that brought it down, so that what it came from must not be taken away alone.
+/// The value of such a node jumps down from its start value, see [`ceiling`](super::tile::coefficients::ceiling). Where the metric is obtuse it may then support the very
+/// nodes that lowered it, so that forgetting what it came from would not be noticed.
 fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize)> {
     let is_contested = |tile: &usize| {
         let pairs = seeds[*tile].iter().flat_map(|seeds| seeds.iter()).zip(values.tile(*tile));
@@ -189,9 +189,9 @@ fn count_reached(values: &Values, tile: usize) -> usize {
     values.tile(tile).iter().filter(|&&value| value < UNREACHED).count()
 }
 
-/// Takes the values of these nodes away; for each tile the least of them, or of those that a stop took away.
-fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
-    let mut lost = stopped(&map.values);
+/// Forgets the values of these nodes. Returns for each tile the least of them, or of those that a stop masked.
+fn forget(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
+    let mut lost = masked(&map.values);
     for &(tile, place) in nodes {
         let value = &mut map.values.tile_mut(tile)[place];
         lost[tile] = lost[tile].min(value.min(UNREACHED));
@@ -201,9 +201,9 @@ fn clear(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
     lost
 }
 
-/// [`UNREACHED`] for each tile where a stopped solve took away what a value may have come from: on obtuse metrics that
-/// is a segment of which one end may be farther than the node itself.
-fn stopped(values: &Values) -> Vec<f32> {
+/// [`UNREACHED`] for each tile where a stopped solve masked a value from which another may have come (where the metric is obtuse, one end of
+/// the segment may be farther away than the node itself); infinite for the others.
+fn masked(values: &Values) -> Vec<f32> {
     let is_front = |tile: usize| {
         values.tile(tile).contains(&UNREACHED)
             && around(values, tile).any(|tile| count_reached(values, tile) > 0)

@@ -18,7 +18,7 @@ use crate::grid::tiling::SIDE;
 use crate::linalg::lanes::{lanes, least};
 use crate::linalg::simd::{self, Kernel};
 
-/// Least value of a node over its ring, with the step to the point of the ring it came from, see [`foot::best_foot`].
+/// Least value of a node over its ring, with the step to the point of the ring at which it is attained, see [`foot::best_foot`].
 pub(super) fn best_foot(
     field: &TensorField,
     factors: &Factors,
@@ -38,8 +38,8 @@ pub(super) fn best_foot(
 pub(super) const NOWHERE: u8 = u8::MAX;
 
 /// The predecessor of each node, row-major, as a place on its [`RING`]: of the two ends of the segment that
-/// its value came from, the one nearer to the point it came from; the other, if only that is lower than the node. [`NOWHERE`]
-/// where not reached. With a factor taken out both may be higher; the nearer one still leads to the start.
+/// its value came from, the one nearer to that point; the other, if only that is lower than the node. [`NOWHERE`]
+/// where not reached. Where a factor applies both may be higher than the node; the nearer one still leads to the start.
 pub(super) fn predecessors(field: &TensorField, factors: &Factors, values: Values) -> Vec<u8> {
     let tiling = field.tiling;
     let values = SharedValues::new(values, f32::INFINITY);
@@ -52,7 +52,7 @@ pub(super) fn predecessors(field: &TensorField, factors: &Factors, values: Value
             let tile = Tile { tensors: field.tensors(index), factor, tolerance: 0.0, seeds: None };
             values.read(index, block);
             let [cols, _] = tiling.size(index);
-            let found = simd::dispatch(OfTile { block, tile: &tile });
+            let found = simd::dispatch(TilePredecessors { block, tile: &tile });
             for (line, found) in band.chunks_mut(tiling.cols).zip(found) {
                 line[x * SIDE..][..cols].copy_from_slice(&found[..cols]);
             }
@@ -61,20 +61,20 @@ pub(super) fn predecessors(field: &TensorField, factors: &Factors, values: Value
     predecessors
 }
 
-/// The predecessors of the nodes of a tile.
-struct OfTile<'a> {
+/// Finds the predecessors of the nodes of a tile.
+struct TilePredecessors<'a> {
     block: &'a Block,
     tile: &'a Tile<'a>,
 }
 
-impl Kernel for OfTile<'_> {
+impl Kernel for TilePredecessors<'_> {
     type Output = [[u8; SIDE]; SIDE];
 
     #[inline(always)]
     fn run(self) -> Self::Output {
         let mut predecessors = [[NOWHERE; SIDE]; SIDE];
         for row in 0..SIDE {
-            let line = of_line(self.block, self.tile, row);
+            let line = line_predecessors(self.block, self.tile, row);
             for i in 0..SIDE {
                 predecessors[row][i] = line[i] as u8;
             }
@@ -83,8 +83,9 @@ impl Kernel for OfTile<'_> {
     }
 }
 
+/// The predecessors of the nodes of a row of a tile.
 #[inline(always)]
-fn of_line(block: &Block, tile: &Tile<'_>, row: usize) -> [u32; SIDE] {
+fn line_predecessors(block: &Block, tile: &Tile<'_>, row: usize) -> [u32; SIDE] {
     let (mut k, mut limits) = (Coefficients::CLOSED, LaneLimits::default());
     let tensors = line_tensors(tile, row, false);
     k.prepare(tile, row, false, &tensors, &mut limits);
@@ -112,7 +113,7 @@ fn of_line(block: &Block, tile: &Tile<'_>, row: usize) -> [u32; SIDE] {
             let through = k.closed_form(t, i).through(g[a], g[b]);
             let (s, q) = if t.along_y { (yy, xx) } else { (xx, yy) };
             let is_near_b =
-                g[b] - g[a] < slope_in_the_middle(s, q, if t.falling { -xy } else { xy }, det);
+                g[b] - g[a] < middle_slope_limit(s, q, if t.falling { -xy } else { xy }, det);
             let (a_lower, b_lower) = (ring[a] < own[i], ring[b] < own[i]);
             let to_b = (is_near_b & (b_lower | !a_lower)) | (b_lower & !a_lower);
             let to = if to_b { b as u32 } else { a as u32 };
@@ -137,11 +138,11 @@ impl Best {
     }
 }
 
-/// `−mᵀMw/‖m‖` in the middle `m` of a segment, with `D = [s β; β q]` as in
-/// [`ClosedForm`](super::stencil::segment::ClosedForm). Where `d` is below this the slope of the sum is negative in the middle, and
-/// the point of the least is nearer to `b`.
+/// `−mᵀMw/‖m‖` at the middle `m` of a segment, with `D = [s β; β q]` as in
+/// [`ClosedForm`](super::stencil::segment::ClosedForm). Where `d = gb − ga` is less, the sum still falls at the middle, and its minimum is
+/// nearer to `b`.
 #[inline(always)]
-fn slope_in_the_middle(s: f32, q: f32, beta: f32, det: f32) -> f32 {
+fn middle_slope_limit(s: f32, q: f32, beta: f32, det: f32) -> f32 {
     (beta - 0.5 * s) / ((q - beta + 0.25 * s) * det).sqrt()
 }
 

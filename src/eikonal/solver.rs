@@ -18,8 +18,8 @@ use crate::metric::MetricField;
 /// Solves the eikonal equation.
 ///
 /// Work is shared with the threads of the current rayon pool, and several solves at once share a pool fairly: a small one does not
-/// wait for the end of large ones. To that end a solve of more than some 15 ms that runs on a thread of the pool takes up other
-/// work of the pool now and then, as the operations of rayon do, and goes on when that is done.
+/// wait for the end of large ones. To that end a solve of more than some 15 ms that runs on a thread of the pool runs other
+/// work of the pool now and then, as the operations of rayon do, and continues when that is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
     /// Iteration stops where a node would change by less than this share of its shortest step. Default 1e-3,
@@ -106,7 +106,7 @@ impl Solver {
         self.correct(map, &seeds, &[], control)
     }
 
-    /// Brings first-order values to second order, if that is asked for; if they have a correction, only where tiles `changed`.
+    /// Corrects first-order values to second order, if that is asked for; if they have a correction, only downstream of the tiles that `changed`.
     pub(super) fn correct(
         &self,
         mut map: DistanceMap,
@@ -125,7 +125,7 @@ impl Solver {
         Ok(map)
     }
 
-    /// Goes on with a map that a [`Stop`] ended, without solving again what is final. The outcome is that of a solve
+    /// Continues a map that a [`Stop`] ended, without solving again what is final. The result is that of a solve
     /// with the new `stop` from the beginning, within the tolerance; [`DistanceMap::statistics`] count what was added.
     ///
     /// # Errors
@@ -133,14 +133,14 @@ impl Solver {
     pub fn resume(&self, map: DistanceMap, stop: &Stop, control: &Control) -> Result<DistanceMap> {
         stop.check()?;
         let seeds = source::seeds(&map.field, &map.starts)?;
-        let before = map.to_correct();
-        let map = self.go_on(map, &[], &seeds, stop, control)?;
+        let before = map.values_if_corrected();
+        let map = self.continue_from(map, &[], &seeds, stop, control)?;
         let changed = map.differing(before);
         self.correct(map, &seeds, &changed, control)
     }
 
-    /// Solves, to first order, from the nodes that are unreached in `map` and around the `edited` ones, see [`Changes::Since`].
-    pub(super) fn go_on(
+    /// Continues, to first order, from the nodes that are unreached in `map` and around the `edited` ones, see [`Changes::Since`].
+    pub(super) fn continue_from(
         &self,
         map: DistanceMap,
         edited: &[f32],

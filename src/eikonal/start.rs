@@ -64,12 +64,12 @@ impl StartRegion {
     /// # Errors
     /// A value or a coordinate that is no number; a region that reaches far around a periodic grid.
     pub(super) fn check(&self, tiling: &Tiling) -> Result<()> {
-        /// So many times around the grid a region may reach in a periodic direction.
-        const MOST_TURNS: f64 = 64.0;
+        /// A region may reach so many periods from the grid in a periodic direction.
+        const MAX_PERIODS: f64 = 64.0;
         if !(self.value.is_finite() && self.value >= 0.0) {
             return Err(Error::argument("the value of a start region", self.value, "0 or more"));
         }
-        let far = MOST_TURNS * DVec2::new(tiling.cols as f64, tiling.rows as f64);
+        let far = MAX_PERIODS * DVec2::new(tiling.cols as f64, tiling.rows as f64);
         let bad = |at: &DVec2| {
             let [across, down] = tiling.periodic;
             !at.is_finite() || (across && at.x.abs() > far.x) || (down && at.y.abs() > far.y)
@@ -78,7 +78,7 @@ impl StartRegion {
             Some(at) => Err(Error::argument(
                 "a point of the start",
                 at,
-                format!("finite, and at most {MOST_TURNS} turns around a grid that is periodic"),
+                format!("finite, and at most {MAX_PERIODS} turns around a grid that is periodic"),
             )),
             None => Ok(()),
         }

@@ -32,7 +32,7 @@ impl TensorTile {
 /// The speed tensors of a grid in index coordinates (column, row; spacing 1), divided by a power of four
 /// so that typical entries are near 1 and `f32` never overflows, whatever the unit of the terrain.
 ///
-/// The parameters of a closed surface go round: see [`periodic`](Self::periodic).
+/// The grid of a closed surface is periodic: see [`periodic`](Self::periodic).
 #[derive(Clone, Debug)]
 pub struct TensorField {
     pub(crate) tiling: Tiling,
@@ -47,7 +47,7 @@ pub struct TensorField {
 }
 
 impl TensorField {
-    /// Samples a metric at the nodes of its surface, periodic where that is. Nodes within metres of a pole, where cells have no width, are closed.
+    /// Samples a metric at the nodes of its surface; periodic where the surface is. Rows at a pole, where cells have hardly any width, are closed.
     ///
     /// # Errors
     /// [`Error::Argument`] if the metric has no quadratic form, a closed direction fewer than 3 nodes, or a tensor is too far from
@@ -55,7 +55,7 @@ impl TensorField {
     pub fn sample(metric: &MetricField<'_>, control: &Control) -> Result<Self> {
         metric.check_quadratic()?;
         let surface = metric.surface();
-        // One node per step.
+        // Index coordinates: one node per step.
         let stretch: Vec<_> =
             (0..surface.rows()).map(|row| surface.axes(row as f64).recip()).collect();
         let widest = surface.frame().map_or(f64::INFINITY, |map| NO_WIDTH / map.mid_spacing().x);
@@ -94,11 +94,11 @@ impl TensorField {
         Self::build(cols, rows, &vec![DVec2::ONE; rows], sample, control)
     }
 
-    /// The same field on a grid that closes on itself in the columns, the rows or both, as the parameters of a cylinder or a
-    /// torus do: where `directions` says so, after the last node comes the first again, one step on.
+    /// The same field on a grid that is periodic in the columns, the rows or both, as the parameters of a cylinder or a
+    /// torus are: where `directions` says so, the first node follows the last, one step on.
     ///
-    /// A coordinate in such a direction may be any number; those a whole turn apart (the number of columns or of rows) mean the
-    /// same place. A line or an area of a start that crosses the seam goes on beyond the grid.
+    /// A coordinate in such a direction may be any number; those that differ by the period (the number of columns or of rows) mean the
+    /// same point. A line or an area of a start that crosses the seam goes on beyond the grid.
     ///
     /// # Errors
     /// [`Error::Argument`] if there are fewer than 3 nodes in a periodic direction.
@@ -135,7 +135,7 @@ impl TensorField {
         (Self { tiling, tiles, frame: None, ..*self }, first)
     }
 
-    /// Closes the nodes that `is_open` says no to, given column and row.
+    /// Closes the nodes for which `is_open`, given column and row, is false.
     pub(crate) fn restrict(&mut self, is_open: impl Fn(usize, usize) -> bool) {
         for (index, tile) in self.tiles.iter_mut().enumerate() {
             let [cols, rows] = self.tiling.size(index);
@@ -195,7 +195,7 @@ impl TensorField {
         Ok(Self { tiling, tiles, root_scale, mean_step, unit: Unit::Unknown, frame: None })
     }
 
-    /// Unit of the distance; empty if it is not known.
+    /// Unit of the distance; [`Unit::Unknown`] if it is not known.
     #[must_use]
     pub fn unit(&self) -> Unit {
         self.unit
@@ -254,7 +254,7 @@ impl TensorField {
         &self.tiles[tile]
     }
 
-    /// Square root of the scale that was divided out of the tensors.
+    /// Square root of the scale by which the tensors were divided.
     pub(super) fn root_scale(&self) -> f64 {
         self.root_scale
     }
@@ -286,11 +286,11 @@ struct Cells {
     /// Sum of their lengths `det(D)^(−1/4)`, in stored units.
     lengths: f32,
     count: u32,
-    /// How many more would be open, but are too far from what is typical.
+    /// How many others would be open, but have tensors too far from what is typical.
     lost: u32,
 }
 
-/// The refusal of `count` tensors, the first of them at this node.
+/// The error for `count` tensors, the first of them at this node.
 fn too_far(col: usize, row: usize, count: u64) -> Error {
     let others = match count {
         1 => String::new(),
@@ -337,8 +337,8 @@ fn typical_speed(
     (0.25 * mean).round().exp2()
 }
 
-/// Stores the tensors of a block in coordinates stretched by `stretch` of each row and `shrink`. A tensor out of the range
-/// of `f32` is lost.
+/// Stores the tensors of a block in coordinates stretched by `stretch` of each row and by `shrink`. Where a tensor is out of the range
+/// of `f32`, the node is closed and counted as lost.
 struct Store<'a> {
     speeds: &'a SpeedBlock,
     stretch: &'a [DVec2],
@@ -375,7 +375,7 @@ impl Kernel for Store<'_> {
     }
 }
 
-/// Whether a number, and the numbers it is multiplied with, keep within the range of `f32`.
+/// Whether a number is small and large enough that products of a few such stay in the range of `f32`.
 #[inline(always)]
 fn fits(value: f64) -> bool {
     (1e-15..1e15).contains(&value)

@@ -73,7 +73,7 @@ fn order(coarse: f64, fine: f64, refinement: f64) -> f64 {
 
 #[test]
 fn constant_tensors_converge_to_the_norm() {
-    // Clean first order: the cone of the point source, which would make it h log h, is taken out.
+    // First order without the logarithm of h log h: source factoring removes the singularity.
     for (ratio, bound) in [(1.0, 2.5e-4), (4.0, 3e-4), (25.0, 6e-4), (100.0, 1e-3)] {
         let d = rotated(ratio, 0.5);
         let mean = [51, 101, 201, 401].map(|n| {
@@ -261,7 +261,7 @@ fn the_default_tolerance_moves_no_value_noticeably() {
 }
 
 #[test]
-fn no_value_beside_crowded_starts_is_too_low() {
+fn no_value_next_to_crowded_starts_is_too_low() {
     for ratio in [1.0, 10.0, 100.0, 400.0] {
         for spacing in [1.5, 3.4, 9.0, 27.0] {
             let d = rotated(ratio, 0.4);
@@ -309,11 +309,11 @@ fn thread_count_changes_no_bit() {
     }
 }
 
-/// The threads of a pool help each other's solves, and none waits for one that is busy with its own.
+/// The threads of a pool work on each other's solves, and none waits for one that is busy with its own.
 #[test]
-fn solves_side_by_side_are_as_alone() {
+fn solves_at_the_same_time_are_as_alone() {
     let start = |i: usize| DVec2::new(20.0 + 15.0 * i as f64, 90.5);
-    // Large enough to give way to each other.
+    // Large enough to yield to each other.
     let f = field(450, 450, |c, r| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64)));
     let alone: Vec<_> = (0..8).map(|i| solve(f.clone(), start(i)).values).collect();
     for threads in [1, 2, 3] {
@@ -325,7 +325,7 @@ fn solves_side_by_side_are_as_alone() {
     }
 }
 
-/// Begins three large solves and a small one at once; which are over, in that order, by the numbers of their columns.
+/// Begins three large solves and a small one at once; returns the numbers of their columns in the order in which they end.
 fn race(begin: impl Fn(&[&(dyn Fn() + Sync)])) -> Vec<usize> {
     let tensor = |c: usize, r: usize| Some(rotated(9.0, 0.01 * (c + 2 * r) as f64));
     let (large, small) = (field(700, 700, tensor), field(70, 70, tensor));
@@ -437,7 +437,7 @@ fn solve_from(field: TensorField, starts: &[(DVec2, f64)], stop: &Stop) -> Dista
 
 #[test]
 fn the_nearest_start_wins_its_value_included() {
-    // Additively weighted Voronoi regions of a constant tensor; the last start is beaten on its own ground.
+    // Additively weighted Voronoi regions of a constant tensor; the last start has no region, as others are nearer even there.
     let starts = [
         (DVec2::new(30.3, 40.8), 0.0),
         (DVec2::new(120.0, 35.2), 12.5),
@@ -584,7 +584,7 @@ fn numbers_out_of_range_are_refused() {
     );
 }
 
-/// A number of the kind that breaks programs, now and then.
+/// A usual number, or now and then one of the kind that breaks programs.
 fn any_number(usual: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
     let rare = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, 1e-300, 1e300, 1e18];
     prop_oneof![50 => usual, 1 => proptest::sample::select(rare.to_vec())]
@@ -785,8 +785,8 @@ proptest! {
     ) {
         let at = |c: usize, r: usize| if (c, r) == (9, 11) { Some(IDENTITY) } else { tensors[r * 20 + c] };
         let plain = exactly(field(20, 20, at), DVec2::new(9.0, 11.0));
-        let turned = |d: Sym2| Sym2::new(d.yy, d.xy, d.xx);
-        let swapped = exactly(field(20, 20, |c, r| at(r, c).map(turned)), DVec2::new(11.0, 9.0));
+        let transposed = |d: Sym2| Sym2::new(d.yy, d.xy, d.xx);
+        let swapped = exactly(field(20, 20, |c, r| at(r, c).map(transposed)), DVec2::new(11.0, 9.0));
         let flipped = |d: Sym2| Sym2::new(d.xx, -d.xy, d.yy);
         let mirrored = exactly(field(20, 20, |c, r| at(19 - c, r).map(flipped)), DVec2::new(10.0, 11.0));
         for row in 0..20 {

@@ -3,7 +3,7 @@
 //! A line crosses an edge between two nodes where the field, linear along the edge, takes the level
 //! (Lorensen & Cline 1987 in two dimensions). Cells with a corner that has no value are left out, so
 //! lines end there instead of running along the hole. (Contouring crates close their rings around
-//! holes and along the border, which would draw lines that are no isolines.)
+//! holes and along the border, which would draw lines that are not isolines.)
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -86,7 +86,7 @@ pub fn isolines(frame: &GridFrame, values: &[f32], levels: &[f64]) -> Result<Vec
         .collect())
 }
 
-/// A segment of a line inside one cell, between two edges of the grid. Edge `2i` leads from node `i`
+/// A segment of an isoline inside one cell, between two edges of the grid. Edge `2i` leads from node `i`
 /// to the east, edge `2i + 1` to the south.
 #[derive(Clone, Copy)]
 struct Segment {
@@ -130,8 +130,8 @@ impl Field<'_> {
         segments
     }
 
-    /// Joins the segments of one level end to start. Each edge is the start of at most one segment
-    /// and the end of at most one, as the cells on its two sides walk it in opposite directions.
+    /// Joins the segments of one level end to start. Each edge is the start of at most one segment and the end of at
+    /// most one, as the walks around the cells on its two sides pass it in opposite directions.
     fn link(&self, mut segments: Vec<Segment>, level: f64) -> Vec<Vec<DVec2>> {
         segments.sort_unstable_by_key(|s| s.start);
         let next: Vec<Option<usize>> = segments

@@ -2,10 +2,10 @@
 
 use glam::DVec2;
 
-/// Whether no wall is between two points nearby. A wall is a closed node or the line between two neighbouring ones; `is_open` is asked
-/// for nodes by column and row, also outside the grid.
+/// Whether no wall lies between two points nearby. A wall is a closed node, or the line between two neighbouring closed nodes. `is_open` is
+/// called with column and row of a node, also outside the grid.
 pub(crate) fn in_sight(a: DVec2, b: DVec2, is_open: impl Fn(isize, isize) -> bool) -> bool {
-    /// Samples per cell of length: a wall in a cell is crossed by more than one of them or hardly touched.
+    /// Samples per cell of length: dense enough that a segment that passes between samples hardly touches a wall.
     const DENSITY: f64 = 8.0;
     let steps = (a.distance(b) * DENSITY).ceil().max(1.0);
     (0..=steps as usize).all(|i| {
@@ -16,7 +16,8 @@ pub(crate) fn in_sight(a: DVec2, b: DVec2, is_open: impl Fn(isize, isize) -> boo
     })
 }
 
-/// In a cell with closed corners: whether the segment stays on the side of its own end's corner.
+/// In a cell with closed corners: whether the sample `at` of the segment from `a` to `b` is nearest to an open corner, and the segment crosses no
+/// wall along a diagonal of the cell.
 fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) -> bool {
     // The nearest corner, or one of the nearest, must be open, ...
     let distance = |i: usize| at.distance_squared(DVec2::new((i % 2) as f64, (i / 2) as f64));

@@ -1,4 +1,4 @@
-//! Grids: where nodes lie, and what geometry touches them.
+//! Grids: where nodes lie, how they are cut into tiles, and which of them geometry touches.
 
 mod frame;
 mod isolines;

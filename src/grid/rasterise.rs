@@ -6,14 +6,14 @@ use super::frame::GridFrame;
 use super::shapes::{Shapes, nodes_inside};
 use super::tiling::Tiling;
 
-/// Marks, row-major, every cell that the shapes touch: the cells a line runs through are joined by their sides, so no step between
-/// neighbours, diagonal ones included, slips through them.
+/// Marks, row-major, every cell that the shapes touch. The cells that a line runs through are connected by their sides, so that no step between
+/// neighbouring nodes, diagonal steps included, can cross the line between them.
 #[must_use]
 pub fn rasterise(frame: &GridFrame, shapes: &Shapes) -> Vec<bool> {
     let mut cells = Cells { frame, touched: vec![false; frame.nodes()] };
     shapes.points.iter().for_each(|&point| cells.touch_along(point, point));
     shapes.segments().for_each(|[a, b]| cells.touch_along(a, b));
-    // And those whose centre lies inside.
+    // Of polygons also the cells whose centres lie inside.
     let tiling = Tiling::new(frame.cols(), frame.rows());
     for polygon in &shapes.polygons {
         nodes_inside(polygon, &tiling, |col, row| cells.touched[frame.index(col, row)] = true);
@@ -27,17 +27,17 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
-    /// Walks from cell to cell through their sides: Amanatides & Woo, A Fast Voxel Traversal
+    /// Marks the cells along a segment, walking from cell to cell through their sides: Amanatides & Woo, A Fast Voxel Traversal
     /// Algorithm for Ray Tracing, Eurographics 1987.
     fn touch_along(&mut self, a: DVec2, b: DVec2) {
         let size = DVec2::new(self.frame.cols() as f64, self.frame.rows() as f64);
-        // From here on a cell's corner, not its centre, has whole coordinates.
+        // From here on the corners of cells, not their centres, have integer coordinates.
         let Some((a, b)) = clip(a + 0.5, b + 0.5, size) else { return };
         let (mut cell, last, along) = (a.floor(), b.floor(), b - a);
         let forward = DVec2::select(along.cmpge(DVec2::ZERO), DVec2::ONE, DVec2::NEG_ONE);
         self.touch(cell);
         while cell != last {
-            // Share of the segment at which it leaves the cell through the side ahead of it.
+            // The parameters at which the segment leaves the cell through its sides ahead in x and in y.
             let leaves = (cell + forward.max(DVec2::ZERO) - a) / along;
             if cell.y == last.y || (cell.x != last.x && leaves.x < leaves.y) {
                 cell.x += forward.x;
@@ -71,7 +71,7 @@ fn clip(a: DVec2, b: DVec2, size: DVec2) -> Option<(DVec2, DVec2)> {
             leave = leave.min(one.max(other));
         }
     }
-    // The clamp takes the rounding of `a + along * t`.
+    // The clamp removes the rounding error of `a + along * t`.
     let at = |t: f64| (a + along * t).clamp(DVec2::ZERO, size);
     (along.is_finite() && enter <= leave).then(|| (at(enter), at(leave)))
 }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_joined_by_sides() {
+    fn lines_are_connected_by_sides() {
         let drawn = picture(5, 4, line(&[(-9.0, -6.0), (0.0, 0.0), (3.0, 2.0), (300.0, 200.0)]));
         assert_eq!(drawn, ["##...", ".##..", "..###", "....#"].map(String::from));
     }

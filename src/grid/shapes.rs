@@ -7,14 +7,14 @@ use glam::DVec2;
 
 use super::tiling::Tiling;
 
-/// Any geometry of `geo-types` taken apart into what it is made of, in grid coordinates (column, row).
+/// Any geometry of `geo-types` split into points, lines and polygons, in grid coordinates (column, row).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shapes {
     /// Single points, on nodes or between them.
     pub points: Vec<DVec2>,
     /// Polylines.
     pub lines: Vec<LineString<f64>>,
-    /// Areas; inside is what an odd number of the rings of one polygon surround.
+    /// Areas; a point is inside a polygon if an odd number of its rings surround it.
     pub polygons: Vec<Polygon<f64>>,
 }
 
@@ -43,12 +43,12 @@ impl Shapes {
         }
     }
 
-    /// The same shapes with every point moved by `to`.
+    /// The same shapes with every point mapped by `to`.
     ///
     /// # Errors
-    /// The first of `to`.
+    /// The first error of `to`.
     pub fn try_map<E>(mut self, to: impl Fn(DVec2) -> Result<DVec2, E>) -> Result<Self, E> {
-        let move_line = |line: &mut LineString<f64>| {
+        let map_line = |line: &mut LineString<f64>| {
             line.coords_mut().try_for_each(|at| {
                 (at.x, at.y) = to(vector(*at))?.into();
                 Ok(())
@@ -57,15 +57,15 @@ impl Shapes {
         for point in &mut self.points {
             *point = to(*point)?;
         }
-        self.lines.iter_mut().try_for_each(move_line)?;
+        self.lines.iter_mut().try_for_each(map_line)?;
         for polygon in &mut self.polygons {
-            polygon.try_exterior_mut(move_line)?;
-            polygon.try_interiors_mut(|holes| holes.iter_mut().try_for_each(move_line))?;
+            polygon.try_exterior_mut(map_line)?;
+            polygon.try_interiors_mut(|holes| holes.iter_mut().try_for_each(map_line))?;
         }
         Ok(self)
     }
 
-    /// Whether there is nothing in them.
+    /// Whether there are no shapes.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.points.is_empty() && self.lines.is_empty() && self.polygons.is_empty()
@@ -88,7 +88,7 @@ impl Shapes {
         self.lines.iter().chain(self.rings()).flat_map(segments)
     }
 
-    /// The points, and the vertices of lines and borders, each with the vectors to its two neighbours there; zero for none.
+    /// The points, and the vertices of lines and borders, each with the vectors to the two vertices next to it; zero where there is none.
     pub(crate) fn corners(&self) -> impl Iterator<Item = (DVec2, [DVec2; 2])> + '_ {
         let points = self.points.iter().map(|&point| (point, [DVec2::ZERO; 2]));
         points.chain(self.lines.iter().chain(self.rings()).flat_map(corners))
@@ -105,8 +105,8 @@ pub(crate) fn contains(polygon: &Polygon<f64>, at: DVec2) -> bool {
     borders.filter_map(|border| crossing(border, at.y)).filter(|&x| at.x < x).count() % 2 == 1
 }
 
-/// Visits the nodes in a polygon, as `(column, row)`: row by row between the crossings of its borders. The cost is that of the rows that
-/// the borders cross, and of the nodes.
+/// Visits the nodes in a polygon, as `(column, row)`: row by row between the crossings of its borders. The cost is proportional to the
+/// number of crossings and of nodes.
 pub(crate) fn nodes_inside(
     polygon: &Polygon<f64>,
     tiling: &Tiling,
@@ -135,8 +135,8 @@ pub(crate) fn nodes_inside(
     }
 }
 
-/// Where a segment crosses the horizontal line through `y`. Its upper end belongs to it, its lower end does not, so that a border that
-/// only touches the line crosses it twice or not at all.
+/// Where a segment crosses the horizontal line at `y`, if it does. An end on that line counts as lying on the side of smaller `y`, so that a
+/// border that only touches the line crosses it twice or not at all.
 fn crossing([a, b]: [DVec2; 2], y: f64) -> Option<f64> {
     ((a.y > y) != (b.y > y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
 }
@@ -150,7 +150,7 @@ fn segments(line: &LineString<f64>) -> impl Iterator<Item = [DVec2; 2]> + '_ {
     line.lines().map(|segment| [vector(segment.start), vector(segment.end)])
 }
 
-/// The vertices of a line, each with the vectors to its neighbours. A point that is given twice in a row is one.
+/// The vertices of a line, each with the vectors to its neighbours. A point that is repeated counts once.
 fn corners(line: &LineString<f64>) -> Vec<(DVec2, [DVec2; 2])> {
     let mut vertices: Vec<DVec2> = line.coords().map(|&at| vector(at)).collect();
     vertices.dedup();
@@ -164,8 +164,8 @@ fn corners(line: &LineString<f64>) -> Vec<(DVec2, [DVec2; 2])> {
         false => [i.checked_sub(1), Some(i + 1).filter(|&next| next < count)],
     };
     let vector = |from: usize, to: usize| vertices[to] - vertices[from];
-    let sides = |i| neighbours(i).map(|to| to.map_or(DVec2::ZERO, |to| vector(i, to)));
-    (0..count).map(|i| (vertices[i], sides(i))).collect()
+    let edges = |i| neighbours(i).map(|to| to.map_or(DVec2::ZERO, |to| vector(i, to)));
+    (0..count).map(|i| (vertices[i], edges(i))).collect()
 }
 
 fn vector(at: impl Into<(f64, f64)>) -> DVec2 {

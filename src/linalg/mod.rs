@@ -1,4 +1,4 @@
-//! Small linear algebra that every stage uses, and how it is done many numbers at a time.
+//! Small linear algebra that every stage uses, and the means to vectorise hot loops.
 
 pub(crate) mod bilinear;
 pub(crate) mod lanes;

@@ -16,7 +16,7 @@ pub struct Sym2 {
 }
 
 impl Sym2 {
-    /// No matrix at all.
+    /// All entries NaN: no matrix.
     pub const NAN: Self = Self::new(f64::NAN, f64::NAN, f64::NAN);
 
     /// `[xx xy; xy yy]`.
@@ -83,7 +83,7 @@ impl Sym2 {
     /// Whether the matrix is finite, symmetric positive definite.
     #[must_use]
     pub fn is_positive_definite(self) -> bool {
-        // A finite determinant excludes infinite and NaN entries beside a positive diagonal.
+        // With a positive diagonal, a finite determinant excludes infinite and NaN entries.
         self.xx > 0.0 && self.yy > 0.0 && self.det() > 0.0 && self.det().is_finite()
     }
 }

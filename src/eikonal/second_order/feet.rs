@@ -365,8 +365,8 @@ impl Dependencies {
         let mut reads = 0;
         for i in 0..SIDE {
             let triangle = LaneTriangle::from_bits(triangles[i]);
-            let (negative, along_y) = (triangle.negative.is_yes(), triangle.along_y.is_yes());
-            let backwards = triangle.backwards().is_yes();
+            let (negative, along_y) = (triangle.negative.is_true(), triangle.along_y.is_true());
+            let backwards = triangle.backwards().is_true();
             let fixed = triangles[i] == LaneTriangle::NONE;
             // Along the axis of `a`, the line that holds both neighbours; across it the own line, that of `b`, or both.
             let bit = |negative: bool| if negative { BEFORE } else { BEHIND };
@@ -440,8 +440,8 @@ fn neighbours_read(
     let corner = |place: usize, falling: bool, west: bool| {
         let bits = u32::from(feet.packed[place]) & LaneTriangle::ALL;
         let t = LaneTriangle::from_bits(bits);
-        let to_west = if t.along_y.is_yes() { t.backwards() } else { t.negative };
-        bits != LaneTriangle::NONE && t.falling.is_yes() == falling && to_west.is_yes() == west
+        let to_west = if t.along_y.is_true() { t.backwards() } else { t.negative };
+        bits != LaneTriangle::NONE && t.falling.is_true() == falling && to_west.is_true() == west
     };
     let bits = [
         u32::from(cols[east]) & BEHIND != 0,

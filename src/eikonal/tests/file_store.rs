@@ -1,5 +1,5 @@
-//! The seam of the engine: a second, deliberately small store. Tiles are files in a scratch folder; that a solve has the same bits as one
-//! in memory shows that nobody but the store knows where values are.
+//! The interface between schedule and store, tested with a second, deliberately small store: each tile is a file in a temporary folder. That a
+//! solve gives the same bits as one in memory shows that nothing but the store knows where values are kept.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;

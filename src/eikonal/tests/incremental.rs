@@ -44,7 +44,7 @@ fn wall(from: (usize, usize), step: (usize, usize), count: usize) -> Edits {
     (0..count).map(|i| (from.0 + i * step.0, from.1 + i * step.1, None)).collect()
 }
 
-/// A field that is smooth, rough or a maze, and may have alike ground around the start.
+/// A field that is smooth, rough or a maze, and may be uniform around the start.
 fn any_field() -> impl Strategy<Value = TensorField> {
     let rough = proptest::collection::vec(any_tensor(), 60 * 50);
     let rough = rough.prop_map(|tensors| field(60, 50, |c, r| tensors[r * 60 + c]));
@@ -101,7 +101,7 @@ proptest! {
     }
 }
 
-/// A field that turns, of three times the speed along as across.
+/// A field whose direction of greatest speed turns, three times as fast along it as across.
 fn turning(n: usize) -> TensorField {
     field(n, n, |c, r| Some(rotated(9.0, 4.0 * (c + 2 * r) as f64 / n as f64)))
 }
@@ -115,7 +115,7 @@ fn update_one(field: &TensorField, start: DVec2, edits: &Edits) -> [DistanceMap;
 }
 
 #[test]
-fn only_what_an_edit_is_felt_by_is_solved_again() {
+fn only_what_an_edit_affects_is_solved_again() {
     let (f, start) = (turning(501), DVec2::splat(250.0));
     let [update, fresh] = update_one(&f, start, &wall((460, 225), (0, 1), 50));
     let (some, all) = (update.statistics(), fresh.statistics());
@@ -161,9 +161,9 @@ fn edits_at_the_start_move_it_or_leave_none() {
 }
 
 #[test]
-fn what_a_stop_took_away_supports_nothing() {
+fn what_a_stop_masked_supports_nothing() {
     // Obtuse: some nodes have their value from a segment of which one end is farther than they are, even beyond the stop;
-    // what closes the way to there closes the way to them.
+    // what cuts off that end cuts off them.
     let f = field(60, 50, |c, r| Some(rotated(80.0, 0.3 + 0.1 * (c + 2 * r) as f64)));
     let start = DVec2::new(20.0, 18.4);
     let whole = solve_from(f.clone(), &[(start, 0.0)], &Stop::Never);
@@ -201,7 +201,7 @@ fn whole_fields_are_compared_and_other_shapes_solved() {
 }
 
 #[test]
-fn a_correction_follows_an_edit_and_going_on() {
+fn a_correction_follows_edits_and_resuming() {
     let solver = Solver { accuracy: Accuracy::High, ..Solver::default() };
     let (f, start) = (turning(200), [DVec2::new(30.0, 60.0).into()]);
     let control = Control::default();
@@ -222,7 +222,7 @@ fn a_correction_follows_an_edit_and_going_on() {
     assert!(!part.is_reached(190, 100));
     let on = solver.resume(part.clone(), &Stop::Never, &control).unwrap();
     assert!(worst(&on, &whole) < 1e-5, "{:e}", worst(&on, &whole));
-    // To first order it is no more than that.
+    // Resumed in first order, it has no correction any more.
     let fast = Solver::default().resume(part, &Stop::Never, &control).unwrap();
     let first = solve_from(f, &[(DVec2::new(30.0, 60.0), 0.0)], &Stop::Never);
     assert!(worst(&fast, &first) < 1e-4 && fast.error_at_node(100, 50).is_none());

@@ -1,4 +1,4 @@
-//! Grids that close on themselves: the parameters of cylinders, tori and spheres without poles.
+//! Periodic grids: the parameters of cylinders, tori and spheres without poles.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -6,7 +6,7 @@ use super::*;
 
 /// Both accuracies.
 const ACCURACIES: [Accuracy; 2] = [Accuracy::Fast, Accuracy::High];
-/// Which directions are periodic: a cylinder either way round, and a torus.
+/// Which directions are periodic: cylinders along either axis, and a torus.
 const CLOSED: [[bool; 2]; 3] = [[true, false], [false, true], [true, true]];
 
 fn closed(
@@ -23,17 +23,17 @@ fn solve_as(accuracy: Accuracy, field: TensorField, starts: &[StartRegion]) -> D
     solver.solve_field(field, starts, &Stop::Never, &Control::default()).unwrap()
 }
 
-/// The least of a length over the images of a way.
+/// The least of a length over the periodic images of an offset.
 fn over_images(
-    way: DVec2,
+    offset: DVec2,
     period: DVec2,
     [across, down]: [bool; 2],
     length: impl Fn(DVec2) -> f64,
 ) -> f64 {
-    let turns = |periodic: bool| if periodic { -40..=40 } else { 0..=0 };
-    let images = turns(down).flat_map(|j| turns(across).map(move |i| (i, j)));
+    let periods = |periodic: bool| if periodic { -40..=40 } else { 0..=0 };
+    let images = periods(down).flat_map(|j| periods(across).map(move |i| (i, j)));
     let lengths =
-        images.map(|(i, j)| length(way + period * DVec2::new(f64::from(i), f64::from(j))));
+        images.map(|(i, j)| length(offset + period * DVec2::new(f64::from(i), f64::from(j))));
     lengths.fold(f64::INFINITY, f64::min)
 }
 
@@ -58,8 +58,8 @@ fn the_distance_is_that_of_the_nearest_image() {
             ] {
                 let start = DVec2::new(0.3 * cols as f64, rows as f64 - 1.4);
                 let exact = |c: usize, r: usize| {
-                    let way = DVec2::new(c as f64, r as f64) - start;
-                    Some(over_images(way, period, directions, |v| d.inverse().norm(v)))
+                    let offset = DVec2::new(c as f64, r as f64) - start;
+                    Some(over_images(offset, period, directions, |v| d.inverse().norm(v)))
                 };
                 for (accuracy, (most, mean)) in ACCURACIES.into_iter().zip(bounds) {
                     let f = closed(cols, rows, directions, |_, _| Some(d));
@@ -113,7 +113,7 @@ fn a_shifted_start_shifts_the_map() {
             let exact = |c: usize, r: usize| {
                 Some(plain.at_node((c + cols - dx) % cols, (r + rows - dy) % rows))
             };
-            // Which cone a node lies in is decided tile by tile.
+            // Which factor applies is decided tile by tile, and the tiles are shifted relative to the start.
             let errors = errors(&map, exact);
             assert!(errors.0 < 5e-4 && errors.1 < 1e-5, "{by} {accuracy:?}: {errors:?}");
         }
@@ -146,7 +146,7 @@ fn distances_on_a_sphere_converge_over_the_seam() {
 
 #[test]
 fn an_annulus_is_flat() {
-    // Polar coordinates: D = diag(1/ρ², 1). Ways go straight, or around the hole of radius 1 along its border.
+    // Polar coordinates: D = diag(1/ρ², 1). Paths go straight, or around the hole of radius 1 along its border.
     let solve = |n: usize, accuracy: Accuracy| {
         let (rows, step) = (n / 6 + 1, TAU / n as f64);
         let radius = |r: f64| 1.0 + r * step;
@@ -183,8 +183,8 @@ fn a_wall_along_the_seam_does_not_leak() {
                 c == if straight { wall } else { (wall + r.min(39 - r)) % cols }
             };
             let open = |c: usize, r: usize| (!closed_at(c, r)).then_some(IDENTITY);
-            let beside = (wall + 1) % cols;
-            let start = DVec2::new(beside as f64, 0.0);
+            let next = (wall + 1) % cols;
+            let start = DVec2::new(next as f64, 0.0);
             let map =
                 solve_as(Accuracy::High, closed(cols, 40, [true, false], open), &[start.into()]);
             let around = (cols - 2) as f64;
@@ -214,7 +214,7 @@ fn thread_count_changes_no_bit_around_the_seam() {
 }
 
 #[test]
-fn points_a_turn_apart_are_the_same_place() {
+fn points_a_period_apart_are_the_same() {
     let (cols, rows) = (50, 40);
     let start = DVec2::new(49.2, 20.4);
     let f = || closed(cols, rows, [true, false], wavy(cols, rows, 4.0));
@@ -255,9 +255,9 @@ fn lines_and_areas_go_over_the_seam() {
     for (x, y) in [(54.0, 45.0), (-6.0, -5.0), (114.0, 45.0)] {
         let over = map(Polygon::new(ring(x, y), vec![]).into());
         let exact = |c: usize, r: usize| {
-            let way = DVec2::new(c as f64 - x, r as f64 - y) - DVec2::new(6.0, 4.5);
-            let beside = |v: DVec2| (v.abs() - DVec2::new(6.0, 4.5)).max(DVec2::ZERO).length();
-            Some(over_images(way, DVec2::new(60.0, 50.0), [true; 2], beside))
+            let offset = DVec2::new(c as f64 - x, r as f64 - y) - DVec2::new(6.0, 4.5);
+            let outside = |v: DVec2| (v.abs() - DVec2::new(6.0, 4.5)).max(DVec2::ZERO).length();
+            Some(over_images(offset, DVec2::new(60.0, 50.0), [true; 2], outside))
         };
         let errors = errors(&over, exact);
         assert!(errors.0 < 1e-2 && errors.1 < 5e-3, "{errors:?}");
@@ -294,7 +294,7 @@ fn labels_stops_and_resuming_work_around_the_seam() {
 }
 
 #[test]
-fn an_edit_is_felt_over_the_seam() {
+fn an_edit_takes_effect_over_the_seam() {
     let start = DVec2::new(58.0, 40.0);
     for directions in CLOSED {
         let f = closed(60, 80, directions, wavy(60, 80, 25.0));
