@@ -59,7 +59,7 @@ pub(crate) fn fit(
 /// The metric of this name on the surface of the scenario, with what the flags say of it.
 ///
 /// # Errors
-/// `tensor` without `--tensor`; a start or goal where the metric lets nobody enter; cancelled.
+/// `tensor` without `--tensor`; a start or goal on a node that is closed under the metric; cancelled.
 pub(crate) fn bind<'a>(
     scenario: &'a Scenario,
     metric: NamedMetric,

@@ -16,7 +16,7 @@ pub use self::geotiff::{Band, Samples, write_geotiff};
 pub use self::gpx::routes_gpx;
 pub use self::profile::write_profiles;
 
-/// `value` to so many decimals.
+/// `value` rounded to `decimals` decimals.
 fn round(value: f64, decimals: i32) -> f64 {
     let scale = 10f64.powi(decimals);
     (value * scale).round() / scale

@@ -20,7 +20,7 @@ use crate::route::{Comparison, Route, trace};
 use crate::surface::HeightSurface;
 use crate::terrain::{Georeference, Terrain};
 
-/// Everything that lies between the starts and the goals, but the metric.
+/// A question whose files are read and whose places lie on the grid: all that distances and routes need, but the metric.
 #[derive(Clone, Debug)]
 pub struct Scenario {
     /// What was asked.
@@ -114,7 +114,7 @@ impl Scenario {
     /// A metric on the surface, with barriers, costs and aversions.
     ///
     /// # Errors
-    /// Those of [`Metric::on`]; [`Error::Place`] if a start or goal lies where the metric lets nobody enter; cancelled.
+    /// Those of [`Metric::on`]; [`Error::Place`] if a start or goal lies on a node that is closed under the metric; cancelled.
     pub fn bind(&self, metric: &dyn Metric, control: &Control) -> Result<MetricField<'_>> {
         let modifiers = Modifiers {
             climb_weight: self.question.climb_weight,
@@ -226,7 +226,7 @@ impl Scenario {
         Err(error)
     }
 
-    /// Nodes with a height that `field` lets nobody enter, row-major.
+    /// Whether each node, row-major, has a height but is closed in `field`.
     #[must_use]
     pub fn closed_nodes(&self, field: &MetricField<'_>) -> Vec<bool> {
         let frame = self.frame();
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_places_are_told_as_data() {
+    fn bad_places_are_reported_as_data() {
         let refused = |start: &str, goal: &str| match scenario(&split(true), start, goal) {
             Err(Error::Place(place)) => *place,
             other => panic!("{other:?}"),

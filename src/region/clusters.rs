@@ -108,7 +108,7 @@ pub(super) fn seed_cover(
     Ok(SeedCover { seeds, epsilon })
 }
 
-/// Refuses clusters of which [`MOST_CLUSTERS`] hold only so many of the open nodes.
+/// The error for a radius so small that [`MOST_CLUSTERS`] clusters hold only `held` of the `open` nodes.
 fn too_small(epsilon: f64, held: usize, open: usize) -> Error {
     let share = held as f64 / open as f64;
     let advice = if held > 2 * MOST_CLUSTERS {

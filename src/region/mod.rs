@@ -6,7 +6,7 @@
 //! with a smaller `ε`. (Seong, Jeong and Cohen, SMI 2008, definition 4.1 and section 5.1.)
 //!
 //! Distances come from a [`TensorField`](crate::eikonal::TensorField) alone, whatever surface and metric it is of;
-//! [`signatures`] put the shapes of regions into numbers and [`matches()`] finds like ones; [`statistics`]
+//! [`signatures`] put the shapes of regions into numbers and [`matches()`] finds like ones; [`statistics()`]
 //! measures the regions on a [`Surface`](crate::Surface).
 
 mod clusters;

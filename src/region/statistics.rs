@@ -1,4 +1,4 @@
-//! What the regions of a surface are like.
+//! Area, curvature and slope of the regions of a surface.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -5,7 +5,7 @@
 pub struct Rgb(pub u8, pub u8, pub u8);
 
 impl Rgb {
-    /// Blue, for the isotropic metric. With [`ORANGE`](Self::ORANGE) it can be told apart with any
+    /// Blue, for the isotropic metric. With [`ORANGE`](Self::ORANGE) it can be distinguished with any
     /// kind of colour vision.
     pub const BLUE: Self = Self(0x1a, 0x6f, 0xdf);
     /// Red-orange, for the curvature metric.

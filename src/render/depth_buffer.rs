@@ -85,7 +85,7 @@ impl DepthBuffer {
         Some(i)
     }
 
-    /// A triangle, in colours that go over into each other or each in the part nearest to its corner.
+    /// A triangle whose colours are interpolated between the corners (`blend`), or each in the part nearest to its corner.
     pub(super) fn triangle(&mut self, corners: [Vertex; 3], blend: bool) {
         let places = corners.map(|corner| self.to_samples(corner.at));
         let [a, b, c] = places;
@@ -119,7 +119,7 @@ impl DepthBuffer {
         }
     }
 
-    /// A disc of so many pixels in radius that faces the viewer, a little before the surface.
+    /// A disc of `radius` pixels that faces the viewer, a little before the surface.
     pub(super) fn disc(&mut self, at: DVec3, radius: f64, colour: Rgb) {
         let radius = radius * SAMPLES as f64;
         let (centre, depth) = (self.to_samples(at), at.z + LIFT * self.size);

@@ -7,7 +7,7 @@ use super::relief::VOID;
 /// a few extreme curvatures would leave no colour for all the others.
 const SHOWN: f64 = 0.98;
 
-/// How values become colours; both can be told apart with any kind of colour vision.
+/// How values become colours; both can be read with any kind of colour vision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gradient {
     /// From the least to the greatest value (viridis).

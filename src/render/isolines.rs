@@ -7,7 +7,7 @@ use super::layout::MapLayout;
 use super::text;
 use crate::grid::Isoline;
 
-/// Every so many isolines one is thick and labelled.
+/// One of this many isolines is thick and labelled.
 const MAJOR: usize = 5;
 /// Size of the labels of isolines, in pixels of a picture of the default size.
 const LABEL: f32 = 17.0;

@@ -13,7 +13,7 @@ use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::grid::{GridFrame, round_step};
 
-/// Pixels of the map's longer side unless told otherwise.
+/// Pixels of the map's longer side by default.
 pub(super) const SIDE: u32 = 1600;
 /// Fewest and most pixels of the map's longer side.
 pub(super) const SIDES: std::ops::RangeInclusive<u32> = 100..=8192;
@@ -124,7 +124,7 @@ impl MapLayout {
         lines.iter().map(|line| line.iter().map(|&p| self.to_pixels(p)).collect()).collect()
     }
 
-    /// A pin at grid coordinates that bears a letter or a number.
+    /// A pin at grid coordinates with a letter or a number.
     pub(super) fn pin(&mut self, grid: DVec2, mark: &str, colour: Rgb) {
         let at = self.to_pixels(grid);
         draw_pin(&mut self.canvas, at, mark, colour, self.unit);

@@ -23,7 +23,7 @@ pub(super) enum Entry {
     North,
     /// A line of some width.
     Line { colour: Rgb, width: f32, label: String },
-    /// A pin that bears a letter or a number.
+    /// A pin with a letter or a number.
     Pin { colour: Rgb, mark: String, label: String },
     /// A patch of ground: a colour, or the hatching of voids.
     Patch { colour: Option<Rgb>, label: String },

@@ -117,7 +117,7 @@ impl<'a> MapPicture<'a> {
         encode_png(&self.render()?)
     }
 
-    /// What the pin of a goal bears.
+    /// The letter or number on the pin of a goal.
     fn goal_mark(&self, goal: usize) -> String {
         if self.goals.len() == 1 { "G".into() } else { (goal + 1).to_string() }
     }

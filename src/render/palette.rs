@@ -1,4 +1,4 @@
-//! Colours that tell things apart.
+//! Colours that distinguish regions.
 
 use super::colour::Rgb;
 
@@ -16,7 +16,7 @@ const PALETTE: [Rgb; 10] = [
     Rgb(0xfc, 0xcd, 0xe5),
 ];
 
-/// Colours for so many regions, given the region of each node (row-major) of a grid of `cols` columns, such that neighbours differ wherever ten colours are enough for the
+/// Colours for `regions` regions, given the region of each node (row-major) of a grid of `cols` columns, such that neighbours differ wherever ten colours are enough for the
 /// order in which they are given out.
 #[must_use]
 pub fn contrasting_colours(labels: &[Option<u32>], cols: usize, regions: usize) -> Vec<Rgb> {

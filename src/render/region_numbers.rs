@@ -10,7 +10,7 @@ use super::text;
 const LEGIBLE: f32 = 10.0;
 
 /// Writes the number of each region, counted from 1, into the middle of the largest square within it, if that is large enough. `pixels`
-/// are the regions of a part of the canvas of so many columns, `left` and `top` its corner; sizes are between `largest` and half of it.
+/// are the regions of a part of the canvas `width` pixels wide, with its corner at `left`, `top`; sizes are between `largest` and half of it.
 pub(super) fn draw_numbers(
     canvas: &mut Canvas,
     pixels: &[Option<u32>],

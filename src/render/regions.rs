@@ -12,7 +12,7 @@ const NUMBER: f32 = 30.0;
 /// Radius and rim of the mark of a seed.
 const SEED: [f32; 2] = [3.5, 1.5];
 
-/// Regions of a grid. Each that has room for it bears its number, counted from 1.
+/// Regions of a grid. Each that has room for it is numbered, counted from 1.
 #[derive(Clone, Debug)]
 pub struct RegionLayer<'a> {
     /// Region of each node, row-major; `None` for none.

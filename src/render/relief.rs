@@ -91,7 +91,7 @@ fn known(heights: &[f64]) -> impl Iterator<Item = f64> {
     heights.iter().copied().filter(|h| h.is_finite())
 }
 
-/// Factor on the slopes of so many known points that makes their root mean square [`SLOPE_SHOWN`]; gradients are zero where
+/// Factor on the slopes of `known` points that makes their root mean square [`SLOPE_SHOWN`]; gradients are zero where
 /// nothing is known.
 fn exaggeration(gradients: &[DVec2], known: usize) -> f64 {
     let square: f64 = gradients.iter().map(|g| g.length_squared()).sum();

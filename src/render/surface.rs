@@ -22,8 +22,8 @@ pub struct SurfacePicture<'a> {
     pub surface: &'a dyn Surface,
     /// A colour per node, row-major.
     pub colours: &'a [Rgb],
-    /// Whether colours go over into each other between nodes, as those of a field, or each node has its own place, as
-    /// labels do. Default: true.
+    /// Whether colours are interpolated between nodes, as those of a field are, or each node's colour fills the part nearest to it, as
+    /// for labels. Default: true.
     pub blend: bool,
     /// Region of each node, row-major, whose numbers, counted from 1, are written where they are seen and have room; empty for none.
     /// Default: none.

@@ -12,7 +12,7 @@ pub(super) fn hatching(diagonal: usize, period: usize) -> Rgb {
     VOID[usize::from(diagonal % period.max(2) < period.div_ceil(6))]
 }
 
-/// A disc that bears a letter or a number.
+/// A disc with a letter or a number.
 pub(super) fn draw_pin(canvas: &mut Canvas, at: Vec2, mark: &str, colour: Rgb, unit: f32) {
     canvas.disc(at, 14.0 * unit, 3.0 * unit, colour);
     // Long numbers are set smaller.

@@ -33,8 +33,8 @@ pub struct Summary {
     pub mean_grade_percent: f64,
     /// Steepest slope of the ground across the route, degrees.
     pub max_side_slope_deg: f64,
-    /// `∫|κ_n| ds`, the total normal curvature along the route, radians: how much the ground makes the
-    /// traveller pitch.
+    /// `∫|κ_n| ds`, the total normal curvature along the route, radians: how much the
+    /// traveller pitches with the ground.
     pub total_normal_curvature_rad: f64,
     /// Start in map coordinates, or `x` and `y` in space.
     pub start: [f64; 2],
@@ -68,7 +68,7 @@ pub struct ProfilePoint {
     pub normal_curvature_per_m: f64,
 }
 
-/// A short straight piece of a line, seen at its middle.
+/// A short straight piece of a line, measured at its middle.
 struct Piece {
     /// Length on the surface, m.
     length: f64,

@@ -107,7 +107,7 @@ fn measures(
     segmentation.levels.iter().map(of_level).collect()
 }
 
-/// Regions and what is known of them.
+/// Regions with their statistics and signatures.
 struct Regions<'a> {
     scenario: &'a Scenario,
     metric: &'a MetricField<'a>,

@@ -9,7 +9,7 @@ use crate::surface::{BLOCK, Forms};
 
 /// `δ` as a share of the root-mean-square curvature of the region. That of the metric, 0.1, makes peaks of `C` along the lines
 /// where a curvature changes its sign, which few grids resolve. Of 54 parts of seven shapes, each sampled two to six
-/// ways, so many have one of the same part next to them: 39 with 0.1, 48 with 0.5, 51 with 1, 54 with 2, 51 with 4.
+/// ways, the number whose nearest signature is one of the same part: 39 with 0.1, 48 with 0.5, 51 with 1, 54 with 2, 51 with 4.
 const DELTA_SHARE: f64 = 2.0;
 
 /// Area of a region and the integral of `(κ1² + κ2²)/2` over it.
@@ -19,7 +19,7 @@ pub(super) struct Extent {
     squared_curvature: f64,
 }
 
-/// What a region is measured by.
+/// The scales that a region's signature is measured in.
 #[derive(Clone, Copy)]
 pub(super) struct Size {
     /// `√area`, m.

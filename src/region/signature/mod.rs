@@ -1,4 +1,4 @@
-//! What the shape of a region is, in four numbers.
+//! The shape of a region in four numbers.
 //!
 //! The curvature tensor `C` of the surface, as a tensor in space, varies over a region; how it varies is what region
 //! and region are compared by. At every node the four differences `v = (l1⁺, l1⁻, l2⁺, l2⁻)` between `C` there and at four
