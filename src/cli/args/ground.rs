@@ -93,7 +93,7 @@ pub(crate) struct MetricArgs {
     /// Your own speed tensors: a float raster on the DEM's grid with bands D11, D12, D22, x east, y north.
     #[arg(long, value_name = "FILE.tif")]
     pub(crate) tensor: Option<PathBuf>,
-    /// How exactly to solve: `high` is of second order in the cell size and takes 2.3 to 3.4 times as long in the solver.
+    /// How exactly to solve: `high` is of second order in the cell size and takes 2.1 to 3.7 times as long in the solver.
     #[arg(long, value_enum, value_name = "HOW", default_value_t = AccuracyName::Fast)]
     pub(crate) accuracy: AccuracyName,
 }
