@@ -11,7 +11,7 @@ mod shapes;
 
 use glam::{DVec2, DVec3};
 use ridgeway::grid::{isolines, levels_by_step};
-use ridgeway::render::{Gradient, Rgb, SurfacePicture, beside, encode_png};
+use ridgeway::render::{Gradient, Rgb, SurfacePicture, encode_png, side_by_side};
 use ridgeway::{Curvature, GridFrame, Ground, Isotropic, Metric};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -48,6 +48,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         pictures.push(picture.render()?);
     }
-    output::save("figure-5.png", &encode_png(&beside(&pictures)?)?)?;
+    output::save("figure-5.png", &encode_png(&side_by_side(&pictures)?)?)?;
     Ok(())
 }

@@ -10,7 +10,7 @@ mod output;
 
 use glam::{DVec2, DVec3};
 use ridgeway::metric::{Difference, DifferenceForm};
-use ridgeway::render::{Rgb, SurfacePicture, beside, encode_png};
+use ridgeway::render::{Rgb, SurfacePicture, encode_png, side_by_side};
 use ridgeway::{Curvature, Delta, Metric};
 
 use half_cylinders::{HalfCylinders, divide};
@@ -51,6 +51,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         picture.title = format!("{name}; the line is the seam");
         pictures.push(picture.render()?);
     }
-    output::save("figure-8.png", &encode_png(&beside(&pictures)?)?)?;
+    output::save("figure-8.png", &encode_png(&side_by_side(&pictures)?)?)?;
     Ok(())
 }

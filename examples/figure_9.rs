@@ -15,14 +15,14 @@ use std::time::Instant;
 
 use glam::DVec3;
 use ridgeway::Control;
-use ridgeway::region::{Match, Neighbours, matches, signatures};
-use ridgeway::render::{Rgb, SurfacePicture, beside, encode_png, pair_colour};
+use ridgeway::region::{Match, Neighbours, match_regions, signatures};
+use ridgeway::render::{Rgb, SurfacePicture, encode_png, pair_colour, side_by_side};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let views = [DVec3::new(0.3, -1.0, 2.0), DVec3::new(1.0, -2.0, 1.0)];
     let pairs = [parts::letters()?, parts::pieces()?];
     for (((cuts, parts), view), name) in pairs.iter().zip(views).zip(["letters", "pieces"]) {
-        let found = matches(&cuts[0].signatures, &cuts[1].signatures, false)?;
+        let found = match_regions(&cuts[0].signatures, &cuts[1].signatures, false)?;
         println!("{}, {}: unlike, ratio of sizes", cuts[0].name, cuts[1].name);
         for m in &found {
             let [a, b] = [parts[0][m.first], parts[1][m.second]];
@@ -68,5 +68,5 @@ fn draw(cuts: &[parts::Cut; 2], found: &[Match], view: DVec3) -> Result<Vec<u8>,
         picture.title = cut.name.into();
         pictures.push(picture.render()?);
     }
-    encode_png(&beside(&pictures)?)
+    encode_png(&side_by_side(&pictures)?)
 }

@@ -502,18 +502,18 @@ fn places_off_the_ground_are_explained() {
     folder.bad(
         "route split.asc --start pixel:2,1 --goal pixel:4,1",
         2,
-        "--start pixel:2,1 lies on a void of the DEM; the nearest good place is pixel:1,1",
+        "--start pixel:2,1 lies on a void of the DEM; the nearest usable place is pixel:1,1",
     );
     folder.bad(
         "route range.tif --start pixel:3,3 --goal 500780,5000600 --barrier wall.geojson",
         2,
-        "--goal 500780,5000600 lies on a barrier; the nearest good place is 500750,5000600",
+        "--goal 500780,5000600 lies on a barrier; the nearest usable place is 500750,5000600",
     );
     let steep = "route range.tif --start pixel:3,3 --goal pixel:50,30";
     folder.bad(
         &format!("{steep} --max-slope 3"),
         2,
-        "--start pixel:3,3 lies on ground steeper than --max-slope allows; the nearest good place is pixel:5,5",
+        "--start pixel:3,3 lies on ground steeper than --max-slope allows; the nearest usable place is pixel:5,5",
     );
     let costs = format!("{}{}", "-1 ".repeat(10), "2 ".repeat(51)).repeat(41);
     folder.write(
@@ -523,7 +523,7 @@ fn places_off_the_ground_are_explained() {
     folder.bad(
         &format!("{steep} --cost cost.asc"),
         2,
-        "--start pixel:3,3 lies where --cost or --tensor has no value; the nearest good place is pixel:10,3",
+        "--start pixel:3,3 lies where --cost or --tensor has no value; the nearest usable place is pixel:10,3",
     );
     folder.bad(
         "route plain.tif --start lonlat:1,2 --goal pixel:4,1",
@@ -575,8 +575,8 @@ fn no_way_is_an_answer_of_its_own() {
     folder.bad(
         "route split.asc --start pixel:0,1 --goal pixel:4,1",
         1,
-        "--goal pixel:4,1 cannot be reached from the start: voids, barriers or too steep ground lie between; \
-         the nearest good place is pixel:1,1",
+        "--goal pixel:4,1 cannot be reached from the start: voids lie between; \
+         the nearest place that can be reached is pixel:1,1",
     );
     for command in ["route", "compare"] {
         folder.bad(
@@ -584,8 +584,8 @@ fn no_way_is_an_answer_of_its_own() {
                 "{command} range.tif --start pixel:3,3 --goal pixel:50,4 --barrier wall.geojson"
             ),
             1,
-            "--goal pixel:50,4 cannot be reached from the start: voids, barriers or too steep ground lie between; \
-             the nearest good place is pixel:25,4",
+            "--goal pixel:50,4 cannot be reached from the start: barriers lie between; \
+             the nearest place that can be reached is pixel:25,4",
         );
     }
 }

@@ -77,7 +77,9 @@ mod figure_8 {
 }
 
 mod figure_3 {
-    use ridgeway::region::{SegmentOptions, Segmentation, cluster, gaussian_ranks, statistics};
+    use ridgeway::region::{
+        SegmentOptions, Segmentation, cluster, gaussian_ranks, region_statistics,
+    };
 
     use super::waves::{SIDE, field, surface, terrain};
 
@@ -104,7 +106,7 @@ mod figure_3 {
             &Default::default(),
         )
         .unwrap();
-        let measures = statistics(&surface, &cut.levels[0]);
+        let measures = region_statistics(&surface, &cut.levels[0]);
         let mean_area = |curved: bool| {
             let bent = |m: f64| m > 1e-3;
             let areas = measures.iter().filter(|m| bent(m.mean_abs_curvature_per_m[0]) == curved);
@@ -198,7 +200,7 @@ mod figure_7 {
 }
 
 mod figure_9 {
-    use ridgeway::region::matches;
+    use ridgeway::region::match_regions;
 
     use crate::parts;
 
@@ -206,7 +208,7 @@ mod figure_9 {
     #[test]
     fn parts_of_letters_match() {
         let ([first, second], _) = parts::letters().unwrap();
-        let found = matches(&first.signatures, &second.signatures, false).unwrap();
+        let found = match_regions(&first.signatures, &second.signatures, false).unwrap();
         assert_eq!(found.len(), 3);
         for pair in found {
             assert!(pair.first == pair.second && pair.mutual, "{pair:?}");
@@ -218,7 +220,7 @@ mod figure_9 {
     #[test]
     fn the_tail_of_an_ant_matches_a_part_of_a_bishop() {
         let ([ant, bishop], parts) = parts::pieces().unwrap();
-        let found = matches(&ant.signatures, &bishop.signatures, false).unwrap();
+        let found = match_regions(&ant.signatures, &bishop.signatures, false).unwrap();
         let best = found[0];
         assert_eq!([parts[0][best.first], parts[1][best.second]], ["tail"; 2]);
         assert!(best.mutual && best.distance < 0.07, "{best:?}");

@@ -10,7 +10,7 @@ mod waves;
 
 use glam::DVec2;
 use ridgeway::region::{
-    SegmentOptions, Segmentation, cluster, gaussian_ranks, outlines, statistics,
+    SegmentOptions, Segmentation, cluster, gaussian_ranks, outlines, region_statistics,
 };
 use ridgeway::render::{FieldPicture, Gradient, MapPicture, RegionLayer, contrasting_colours};
 use ridgeway::{Control, Error, Solver, Stop, Terrain};
@@ -34,7 +34,7 @@ fn main() -> Result<(), Error> {
     let ranks = gaussian_ranks(&surface);
     let cut = Segmentation::of(&field, &ranks, &options, &control)?;
     println!("regions, {}", cut.levels[0].regions.len());
-    let areas = statistics(&surface, &cut.levels[0]).into_iter().map(|m| m.area_m2);
+    let areas = region_statistics(&surface, &cut.levels[0]).into_iter().map(|m| m.area_m2);
     let (least, most) =
         areas.fold((f64::INFINITY, 0.0), |(a, b), x| (f64::min(a, x), f64::max(b, x)));
     println!("area of the smallest and the largest m2, {least:.0}, {most:.0}");

@@ -33,22 +33,21 @@ impl Failure {
     }
 
     fn naming_goal(error: Error, scenario: &Scenario) -> Self {
-        let Error::NoPath { goal: Location::Grid(at), nearest, .. } = error else {
+        let Error::NoPath { goal: Location::Grid(at), between, nearest } = &error else {
             return error.into();
         };
-        let Some(goal) = scenario.goals.iter().find(|goal| goal.at == at) else {
+        let Some(goal) = scenario.goals.iter().find(|goal| goal.at == *at) else {
             return error.into();
         };
-        let near = match nearest {
-            Some(Location::Grid(near)) => goal.notation.write(near, &scenario.georeference).ok(),
-            _ => None,
-        };
-        let advice = near.map(|near| format!("; the nearest good place is {near}"));
-        let message = format!(
-            "--goal {} cannot be reached from the start: voids, barriers or too steep ground lie between{}",
-            goal.name,
-            advice.unwrap_or_default()
-        );
+        let mut message = format!("--goal {} cannot be reached from the start", goal.name);
+        if !between.is_empty() {
+            message += &format!(": {} lie between", Obstacle::any_of(between));
+        }
+        if let Some(Location::Grid(near)) = *nearest
+            && let Ok(near) = goal.notation.write(near, &scenario.georeference)
+        {
+            message += &format!("; the nearest place that can be reached is {near}");
+        }
         Self { message, code: NO_PATH }
     }
 }
@@ -94,7 +93,7 @@ fn refusal(place: &PlaceError) -> String {
         PlaceErrorKind::Closed(by) if !by.is_empty() => {
             let reasons: Vec<_> = by.iter().map(flag_that_closes).collect();
             let advice = match nearest {
-                Some(near) => format!("; the nearest good place is {near}"),
+                Some(near) => format!("; the nearest usable place is {near}"),
                 None => ", and so does every other cell".to_owned(),
             };
             format!("--{role} {name} lies {}{advice}", reasons.join(" and "))

@@ -70,7 +70,7 @@ pub(crate) fn bind<'a>(
     let metric = ground.metric.metric(metric, scenario.tensors())?;
     let field = scenario.bind(&metric, control)?;
     if !run.quiet
-        && let Some(level) = scenario.outweighed_level(&field)
+        && let Some(level) = scenario.level_cost_dominated_by_climb(&field)
     {
         eprintln!(
             "note: --climb-weight {} is more than 1000 times what level ground costs on the {} metric, {}: \

@@ -78,7 +78,7 @@ impl StartRegion {
             Some(at) => Err(Error::argument(
                 "a point of the start",
                 at,
-                format!("finite, and at most {MAX_PERIODS} turns around a grid that is periodic"),
+                format!("finite, and within {MAX_PERIODS} periods of a grid that is periodic"),
             )),
             None => Ok(()),
         }

@@ -200,12 +200,10 @@ fn clause(text: &str) -> String {
 }
 
 fn between_clause(between: &[Obstacle]) -> String {
-    let names: Vec<_> = between.iter().map(Obstacle::to_string).collect();
-    match &names[..] {
-        [] => String::new(),
-        [one] => format!(": {one} lie between"),
-        [first @ .., last] => format!(": {} or {last} lie between", first.join(", ")),
+    if between.is_empty() {
+        return String::new();
     }
+    format!(": {} lie between", Obstacle::any_of(between))
 }
 
 fn nearest_clause(nearest: &Option<Location>) -> String {

@@ -75,7 +75,7 @@ impl PlaceError {
             (PlaceErrorKind::Outside { .. }, Some(near)) => {
                 format!("; the nearest place on it is {near}")
             }
-            (_, Some(near)) => format!("; the nearest good place is {near}"),
+            (_, Some(near)) => format!("; the nearest usable place is {near}"),
             (_, None) => ", and so does every other cell".to_owned(),
         };
         format!("{kind}{advice}")
@@ -114,12 +114,25 @@ impl fmt::Display for PlaceErrorKind {
             }
             Self::Closed(by) => {
                 let by: Vec<_> = by.iter().map(Obstacle::to_string).collect();
-                write!(f, "lies where the metric lets nobody enter: {}", by.join(", "))
+                write!(f, "lies on ground that is closed under the metric: {}", by.join(", "))
             }
             Self::NotPoints => f.write_str("holds lines or areas; only points will do"),
             Self::OffGround => f.write_str(
                 "touches no open cell of the DEM; the file must be in longitude and latitude (RFC 7946) and overlap the DEM",
             ),
+        }
+    }
+}
+
+impl Obstacle {
+    /// Obstacles as the subject of a sentence: `voids, barriers or too steep ground`.
+    #[must_use]
+    pub fn any_of(obstacles: &[Self]) -> String {
+        let names: Vec<_> = obstacles.iter().map(Self::to_string).collect();
+        match &names[..] {
+            [] => String::new(),
+            [one] => one.clone(),
+            [first @ .., last] => format!("{} or {last}", first.join(", ")),
         }
     }
 }

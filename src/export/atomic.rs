@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all: written beside their place, then renamed into it.
+//! Files that appear whole or not at all: written in the same folder under another name, then renamed.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -69,21 +69,21 @@ pub fn write_file(
     let path = path.as_ref();
     check_free(path, overwrite)?;
     // A link is followed, so that its target is replaced and not the link.
-    let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    write_and_rename(&place, overwrite, write).map_err(|e| Error::io(path, e))
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+    write_and_rename(&target, overwrite, write).map_err(|e| Error::io(path, e))
 }
 
-/// Writes a temporary file beside `place` and renames it.
+/// Writes a temporary file in the folder of `target` and renames it.
 fn write_and_rename(
-    place: &Path,
+    target: &Path,
     overwrite: bool,
     write: impl FnOnce(&mut Output) -> io::Result<()>,
 ) -> io::Result<()> {
-    let mut out = BufWriter::new(temporary_file(parent(place))?);
+    let mut out = BufWriter::new(temporary_file(parent(target))?);
     write(&mut out)?;
     out.flush()?;
     let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
-    if overwrite { file.persist(place) } else { file.persist_noclobber(place) }
+    if overwrite { file.persist(target) } else { file.persist_noclobber(target) }
         .map(drop)
         .map_err(|e| e.error)
 }

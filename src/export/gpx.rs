@@ -38,12 +38,12 @@ fn document(
 fn track(name: &str, route: &Route, to_lonlat: impl Fn(DVec2) -> Result<DVec2>) -> Result<Track> {
     let mut segment = TrackSegment::new();
     for p in &route.points {
-        let place = to_lonlat(p.truncate()).map_err(|e| {
+        let lonlat = to_lonlat(p.truncate()).map_err(|e| {
             e.advise(
                 "name the CRS of the DEM, or write .geojson or .csv, which hold map coordinates",
             )
         })?;
-        let mut point = Waypoint::new((wrapped(place.x), round(place.y, 7)).into());
+        let mut point = Waypoint::new((wrapped(lonlat.x), round(lonlat.y, 7)).into());
         point.elevation = p.z.is_finite().then(|| round(p.z, 2));
         segment.points.push(point);
     }

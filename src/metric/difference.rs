@@ -111,11 +111,11 @@ impl Difference {
     /// [`Error::Argument`](crate::Error::Argument) for a `δ` of the curvature tensor that is not positive and finite;
     /// [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn changes(&self, surface: &dyn Surface, control: &Control) -> Result<Vec<Change>> {
-        self.changes_under(self.curvature_delta.on(surface)?, surface, control)
+        self.changes_with_delta(self.curvature_delta.on(surface)?, surface, control)
     }
 
     /// The same where the curvature tensor has the given `δ`.
-    fn changes_under(
+    fn changes_with_delta(
         &self,
         curvature_delta: f64,
         surface: &dyn Surface,
@@ -148,7 +148,7 @@ impl Metric for Difference {
         // Checked before the work.
         let number = self.delta.number()?;
         let curvature_delta = self.curvature_delta.on(surface)?;
-        let changes = self.changes_under(curvature_delta, surface, control)?;
+        let changes = self.changes_with_delta(curvature_delta, surface, control)?;
         let delta = match self.delta {
             Delta::Absolute(_) => number,
             Delta::Auto(_) => offset(surface, self.form, &changes, number),

@@ -148,7 +148,7 @@ impl Scenario {
     /// What level ground costs on the metric ([`MetricField::level`]), if the climb weight is more than 1000 times as much: the grid then cannot
     /// follow the metric, and distances come out far too short. Else `None`.
     #[must_use]
-    pub fn outweighed_level(&self, field: &MetricField<'_>) -> Option<f64> {
+    pub fn level_cost_dominated_by_climb(&self, field: &MetricField<'_>) -> Option<f64> {
         /// A grade of 60 % is then 19 times as costly as level ground. Across Andorra (75 m cells) the distance is 9 % too short at 1800,
         /// 36 % at 6000.
         const LARGEST: f64 = 1000.0;

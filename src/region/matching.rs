@@ -28,17 +28,17 @@ pub struct Match {
 ///
 /// # Errors
 /// [`Error::Argument`] for more than 16 million pairs.
-pub fn matches(first: &[Signature], second: &[Signature], sized: bool) -> Result<Vec<Match>> {
+pub fn match_regions(first: &[Signature], second: &[Signature], sized: bool) -> Result<Vec<Match>> {
     let pairs = (0..first.len()).flat_map(|i| (0..second.len()).map(move |j| (i, j)));
     let offset = first.len();
     greedy(first, second, pairs, |j| offset + j, sized)
 }
 
-/// Matches regions of one surface with each other, as [`matches()`].
+/// Matches regions of one surface with each other, as [`match_regions`].
 ///
 /// # Errors
-/// As [`matches()`].
-pub fn matches_within(regions: &[Signature], sized: bool) -> Result<Vec<Match>> {
+/// As [`match_regions`].
+pub fn match_regions_within(regions: &[Signature], sized: bool) -> Result<Vec<Match>> {
     let count = regions.len();
     let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
     greedy(regions, regions, pairs, |j| j, sized)
@@ -111,7 +111,7 @@ mod tests {
         let mut regions = regions(&[1.0, 2.0, 3.0, 4.0]);
         regions[1].eigenvalues = [0.0; 4];
         regions[2].eigenvalues = [0.0; 4];
-        assert_eq!(pairs(&matches_within(&regions, false).unwrap()), [(0, 3, true)]);
+        assert_eq!(pairs(&match_regions_within(&regions, false).unwrap()), [(0, 3, true)]);
     }
 
     fn pairs(found: &[Match]) -> Vec<(usize, usize, bool)> {
@@ -121,16 +121,16 @@ mod tests {
     #[test]
     fn the_most_alike_come_first_and_each_is_used_once() {
         let (a, b) = (regions(&[100.0, 9.0, 1.0]), regions(&[1.1, 100.0, 120.0]));
-        let found = matches(&a, &b, false).unwrap();
+        let found = match_regions(&a, &b, false).unwrap();
         assert_eq!(pairs(&found), [(0, 1, true), (2, 0, true), (1, 2, false)]);
         assert_eq!(found[0].distance, 0.0);
         assert!((found[1].size_ratio - 1.1).abs() < 1e-12);
-        assert!(matches(&a, &[], false).unwrap().is_empty());
+        assert!(match_regions(&a, &[], false).unwrap().is_empty());
     }
 
     #[test]
     fn within_one_surface_nothing_matches_itself() {
-        let found = matches_within(&regions(&[5.0, 1.0, 5.0, 1.2, 70.0]), false).unwrap();
+        let found = match_regions_within(&regions(&[5.0, 1.0, 5.0, 1.2, 70.0]), false).unwrap();
         assert_eq!(pairs(&found), [(0, 2, true), (1, 3, true)]);
     }
 
@@ -139,15 +139,15 @@ mod tests {
         let mut b = regions(&[4.0, 4.4]);
         b[0].size = 400.0;
         let a = regions(&[4.0]);
-        assert_eq!(matches(&a, &b, false).unwrap()[0].second, 0);
-        assert_eq!(matches(&a, &b, true).unwrap()[0].second, 1);
+        assert_eq!(match_regions(&a, &b, false).unwrap()[0].second, 0);
+        assert_eq!(match_regions(&a, &b, true).unwrap()[0].second, 1);
     }
 
     #[test]
     fn too_many_pairs_are_refused() {
         let many = vec![Signature::default(); 5000];
-        assert!(matches(&many, &many, false).is_err());
+        assert!(match_regions(&many, &many, false).is_err());
         // Of regions without nodes there is nothing to match.
-        assert!(matches_within(&many[..4], true).unwrap().is_empty());
+        assert!(match_regions_within(&many[..4], true).unwrap().is_empty());
     }
 }

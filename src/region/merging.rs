@@ -17,7 +17,7 @@ impl Segmentation {
     ///
     /// # Errors
     /// A tolerance that is not between 0 and 1; a surface of another size; cancelled.
-    pub fn merge_alike(
+    pub fn merge_similar(
         &mut self,
         surface: &dyn Surface,
         tolerance: f64,
@@ -136,7 +136,7 @@ mod tests {
     fn alike_neighbours_are_joined_and_others_are_not() {
         let merged = |parents, tolerance| {
             let mut cut = strips(parents);
-            cut.merge_alike(&Half, tolerance, &Control::default()).unwrap();
+            cut.merge_similar(&Half, tolerance, &Control::default()).unwrap();
             cut.levels.remove(0)
         };
         let level = merged([None; 6], 0.3);
@@ -148,6 +148,6 @@ mod tests {
         let level = merged(families, 1.0);
         let parents: Vec<_> = level.regions.iter().map(|region| region.parent).collect();
         assert_eq!(parents, [Some(0), Some(1), Some(2)]);
-        assert!(strips([None; 6]).merge_alike(&Half, 1.5, &Control::default()).is_err());
+        assert!(strips([None; 6]).merge_similar(&Half, 1.5, &Control::default()).is_err());
     }
 }

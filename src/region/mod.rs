@@ -6,7 +6,7 @@
 //! with a smaller `ε`. (Seong, Jeong and Cohen, SMI 2008, definition 4.1 and section 5.1.)
 //!
 //! Distances come from a [`TensorField`](crate::eikonal::TensorField) alone, whatever surface and metric it is of;
-//! [`signatures`] put the shapes of regions into numbers and [`matches()`] finds like ones; [`statistics()`]
+//! [`signatures`] put the shapes of regions into numbers and [`match_regions`] finds like ones; [`region_statistics`]
 //! measures the regions on a [`Surface`](crate::Surface).
 
 mod clusters;
@@ -18,8 +18,8 @@ mod signature;
 mod statistics;
 
 pub use self::clusters::{cluster, gaussian_ranks};
-pub use self::matching::{Match, matches, matches_within};
+pub use self::matching::{Match, match_regions, match_regions_within};
 pub use self::outline::outlines;
 pub use self::segmentation::{Level, Region, SegmentOptions, Segmentation};
 pub use self::signature::{Neighbours, Signature, signatures};
-pub use self::statistics::{RegionStatistics, statistics};
+pub use self::statistics::{RegionStatistics, region_statistics};

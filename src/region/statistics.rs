@@ -67,7 +67,7 @@ impl RegionStatistics {
 /// Measures of the regions of a level, in the order of [`Level::regions`]; the level must be one of this surface. Cost: one evaluation of
 /// the surface per node.
 #[must_use]
-pub fn statistics(surface: &dyn Surface, level: &Level) -> Vec<RegionStatistics> {
+pub fn region_statistics(surface: &dyn Surface, level: &Level) -> Vec<RegionStatistics> {
     /// Rows that are evaluated at a time; they are added up one after the other, so that the sums do not depend on the threads.
     const ROWS: usize = 64;
     let mut sums = vec![RegionStatistics::default(); level.regions.len()];
@@ -112,7 +112,7 @@ mod tests {
         let labels = (0..101 * 41).map(|i| middle(i).then_some(0)).collect();
         let region = Region { seed: [50, 20], parent: None, epsilon: 1.0 };
         let level = Level { labels, regions: vec![region] };
-        let [got] = &statistics(&surface, &level)[..] else { panic!() };
+        let [got] = &region_statistics(&surface, &level)[..] else { panic!() };
         let radius = trough.radius().unwrap();
         let area = 2.0 * radius * (205.0 / radius).asin() * 310.0;
         assert_eq!(got.nodes, 41 * 31);

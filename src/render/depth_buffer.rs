@@ -31,7 +31,7 @@ pub(super) struct DepthBuffer {
     depths: Vec<f64>,
     /// What region is seen; none on lines and points.
     regions: Vec<Option<u32>>,
-    /// Samples per metre, and the place of sample 0, 0.
+    /// Samples per metre, and where sample 0, 0 lies.
     scale: f64,
     origin: DVec2,
     size: f64,
@@ -40,9 +40,9 @@ pub(super) struct DepthBuffer {
 impl DepthBuffer {
     /// White, with room for all `nodes` in a picture of `side` pixels along its longer side.
     pub(super) fn new(nodes: &[Option<Vertex>], side: u32) -> Result<Self> {
-        let places = || nodes.iter().flatten().map(|vertex| vertex.at);
-        let least = places().fold(DVec3::INFINITY, DVec3::min);
-        let most = places().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let points = || nodes.iter().flatten().map(|vertex| vertex.at);
+        let least = points().fold(DVec3::INFINITY, DVec3::min);
+        let most = points().fold(DVec3::NEG_INFINITY, DVec3::max);
         let size = least.distance(most);
         let extent = (most - least).truncate();
         if !(size.is_finite() && extent.max_element() > 0.0) {
@@ -70,12 +70,12 @@ impl DepthBuffer {
         })
     }
 
-    /// The place of a point, in samples.
+    /// A point in samples.
     fn to_samples(&self, at: DVec3) -> DVec2 {
         (at.truncate() - self.origin) * self.scale
     }
 
-    /// The sample at a place, if what is `depth` near there is nearest so far.
+    /// The sample in a column and a row, if what is `depth` near there is nearest so far.
     fn nearest(&mut self, x: usize, y: usize, depth: f64) -> Option<usize> {
         let i = y * self.width + x;
         if x >= self.width || y >= self.height || depth <= self.depths[i] {
@@ -87,15 +87,15 @@ impl DepthBuffer {
 
     /// A triangle whose colours are interpolated between the corners (`blend`), or each in the part nearest to its corner.
     pub(super) fn triangle(&mut self, corners: [Vertex; 3], blend: bool) {
-        let places = corners.map(|corner| self.to_samples(corner.at));
-        let [a, b, c] = places;
+        let samples = corners.map(|corner| self.to_samples(corner.at));
+        let [a, b, c] = samples;
         if (b - a).perp_dot(c - a) == 0.0 {
             return;
         }
         let (least, most) = (a.min(b).min(c).ceil(), a.max(b).max(c));
         for y in least.y as usize..=most.y as usize {
             for x in least.x as usize..=most.x as usize {
-                let Some(weights) = barycentric(places, DVec2::new(x as f64, y as f64)) else {
+                let Some(weights) = barycentric(samples, DVec2::new(x as f64, y as f64)) else {
                     continue;
                 };
                 let depth = mean(weights, &corners, |corner| corner.at.z);

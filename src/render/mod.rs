@@ -32,4 +32,4 @@ pub use self::palette::{contrasting_colours, pair_colour};
 pub use self::plot::{LogPlot, Mark};
 pub use self::png::encode_png;
 pub use self::regions::RegionLayer;
-pub use self::surface::{SurfacePicture, beside};
+pub use self::surface::{SurfacePicture, side_by_side};

@@ -36,9 +36,9 @@ pub fn contrasting_colours(labels: &[Option<u32>], cols: usize, regions: usize) 
     let mut chosen: Vec<usize> = Vec::with_capacity(regions);
     for region in 0..regions {
         let first = pairs.partition_point(|pair| (pair.0 as usize) < region);
-        let beside = pairs[first..].iter().take_while(|pair| pair.0 as usize == region);
+        let neighbours = pairs[first..].iter().take_while(|pair| pair.0 as usize == region);
         let taken: Vec<usize> =
-            beside.filter_map(|pair| chosen.get(pair.1 as usize).copied()).collect();
+            neighbours.filter_map(|pair| chosen.get(pair.1 as usize).copied()).collect();
         // Begins at another colour each time, or most regions would have the first few.
         let mut colours = (0..PALETTE.len()).map(|i| (region + i) % PALETTE.len());
         let free = colours.find(|colour| !taken.contains(colour));

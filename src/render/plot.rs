@@ -28,7 +28,7 @@ pub struct Mark {
     pub colour: Rgb,
     /// Disc for the first kind, square for the second, diamond for the third, and so on.
     pub kind: usize,
-    /// What is written beside it; empty for nothing.
+    /// What is written next to it; empty for nothing.
     pub label: String,
 }
 
@@ -62,11 +62,11 @@ impl LogPlot {
         let axes = Axes([0, 1].map(|axis| decades(self.marks.iter().map(|mark| mark.at[axis]))));
         axes.draw(&mut canvas);
         for mark in &self.marks {
-            draw_mark(&mut canvas, axes.place(mark.at), mark.kind, mark.colour);
+            draw_mark(&mut canvas, axes.to_pixels(mark.at), mark.kind, mark.colour);
         }
         for mark in &self.marks {
-            let beside = axes.place(mark.at) + Vec2::new(16.0, 6.0);
-            canvas.text(&mark.label, 0.7 * TEXT, beside, Rgb::INK, 2.0);
+            let right_of_it = axes.to_pixels(mark.at) + Vec2::new(16.0, 6.0);
+            canvas.text(&mark.label, 0.7 * TEXT, right_of_it, Rgb::INK, 2.0);
         }
         self.draw_words(&mut canvas);
         Ok(canvas.into_image())
@@ -129,7 +129,7 @@ impl Axes {
         SIDE as f32 - BOTTOM - share(self.0[1], value) * (SIDE as f32 - TOP - BOTTOM)
     }
 
-    fn place(&self, at: DVec2) -> Vec2 {
+    fn to_pixels(&self, at: DVec2) -> Vec2 {
         Vec2::new(self.x(at.x), self.y(at.y))
     }
 

@@ -43,24 +43,29 @@ struct Square {
 fn largest_squares(pixels: &[Option<u32>], width: usize) -> Vec<Square> {
     let reach = chessboard_distances(pixels, width);
     let count = pixels.iter().flatten().max().map_or(0, |&last| last as usize + 1);
-    let place = |i: usize| DVec2::new((i % width) as f64, (i / width) as f64) + 0.5;
     let labelled =
         || pixels.iter().enumerate().filter_map(|(i, region)| Some((i, (*region)? as usize)));
     let mut sums = vec![(DVec2::ZERO, 0.0); count];
     for (i, region) in labelled() {
-        sums[region].0 += place(i);
+        sums[region].0 += centre(i, width);
         sums[region].1 += 1.0;
     }
     let mut squares = vec![Square::default(); count];
     for (i, region) in labelled() {
-        let off = |at: DVec2| at.distance_squared(sums[region].0 / sums[region].1);
+        let (centroid, middle) = (sums[region].0 / sums[region].1, centre(i, width));
         let (square, half) = (&mut squares[region], reach[i] as f32 - 0.5);
-        let is_nearer = || off(place(i)) < off(square.middle.as_dvec2());
-        if half > square.half || (half == square.half && is_nearer()) {
-            *square = Square { middle: place(i).as_vec2(), half };
+        let is_nearer =
+            middle.distance_squared(centroid) < square.middle.as_dvec2().distance_squared(centroid);
+        if half > square.half || (half == square.half && is_nearer) {
+            *square = Square { middle: middle.as_vec2(), half };
         }
     }
     squares
+}
+
+/// The centre of pixel `i` on rows of `width` pixels.
+fn centre(i: usize, width: usize) -> DVec2 {
+    DVec2::new((i % width) as f64, (i / width) as f64) + 0.5
 }
 
 /// Steps of a chess king from each pixel to the nearest that is of another region or outside (Rosenfeld and Pfaltz 1966: two passes are enough).

@@ -149,9 +149,9 @@ fn brightness(gradient: DVec2) -> f64 {
 }
 
 fn tint(height: f64) -> Rgb {
-    let place = height.clamp(0.0, 1.0) * (TINT.len() - 1) as f64;
-    let below = (place as usize).min(TINT.len() - 2);
-    TINT[below].mix(TINT[below + 1], place - below as f64)
+    let position = height.clamp(0.0, 1.0) * (TINT.len() - 1) as f64;
+    let below = (position as usize).min(TINT.len() - 2);
+    TINT[below].mix(TINT[below + 1], position - below as f64)
 }
 
 /// `colour` darker below brightness 1 and lighter above.

@@ -91,16 +91,24 @@ impl<'a> SurfacePicture<'a> {
             (0..rows).into_par_iter().flat_map_iter(|row| self.vertices(row, &camera)).collect();
         let mut buffer = DepthBuffer::new(&nodes, self.max_side_px)?;
         self.draw_cells(&mut buffer, &nodes);
-        let place = |at: DVec2| camera.project(self.surface.space_jet(at).point);
         for (line, colour) in &self.lines {
             for ends in line.windows(2) {
-                buffer.line(place(ends[0]), place(ends[1]), *colour);
+                buffer.line(
+                    self.project(ends[0], &camera),
+                    self.project(ends[1], &camera),
+                    *colour,
+                );
             }
         }
         for (at, colour) in &self.points {
-            buffer.disc(place(*at), 4.0, *colour);
+            buffer.disc(self.project(*at, &camera), 4.0, *colour);
         }
         self.compose(&buffer)
+    }
+
+    /// Where the camera sees the surface at grid coordinates.
+    fn project(&self, at: DVec2, camera: &Camera) -> DVec3 {
+        camera.project(self.surface.space_jet(at).point)
     }
 
     /// [`render`](Self::render) as a PNG file.
@@ -115,11 +123,10 @@ impl<'a> SurfacePicture<'a> {
     fn draw_cells(&self, buffer: &mut DepthBuffer, nodes: &[Option<Vertex>]) {
         let (cols, rows) = (self.surface.cols(), self.surface.rows());
         let [across, down] = self.surface.periodic();
-        let last = |count: usize, periodic: bool| if periodic { count } else { count - 1 };
-        for row in 0..last(rows, down) {
-            for col in 0..last(cols, across) {
-                let node = |i: usize, j: usize| nodes[(row + j) % rows * cols + (col + i) % cols];
-                let [a, b, c, d] = [node(0, 0), node(1, 0), node(1, 1), node(0, 1)];
+        for row in 0..cells(rows, down) {
+            for col in 0..cells(cols, across) {
+                let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)]
+                    .map(|(i, j)| nodes[(row + j) % rows * cols + (col + i) % cols]);
                 for triangle in [[a, b, c], [a, c, d]] {
                     if let [Some(a), Some(b), Some(c)] = triangle {
                         buffer.triangle([a, b, c], self.blend);
@@ -165,11 +172,16 @@ impl std::fmt::Debug for SurfacePicture<'_> {
     }
 }
 
+/// Number of cells along a direction with so many nodes.
+fn cells(nodes: usize, periodic: bool) -> usize {
+    if periodic { nodes } else { nodes - 1 }
+}
+
 /// Pictures side by side, from left to right, on white.
 ///
 /// # Errors
 /// [`Error::Argument`] if there is none or they are too large together.
-pub fn beside(pictures: &[RgbaImage]) -> Result<RgbaImage> {
+pub fn side_by_side(pictures: &[RgbaImage]) -> Result<RgbaImage> {
     let width = pictures.iter().map(RgbaImage::width).sum();
     let height = pictures.iter().map(RgbaImage::height).max().unwrap_or(0);
     let mut all = Canvas::new(width, height)?.into_image();
@@ -206,13 +218,13 @@ mod tests {
         }
         let one = SurfacePicture::new(&tube, &colours).render().unwrap();
         assert_eq!(one.width().max(one.height()), 1600);
-        assert_eq!(beside(&[one.clone(), one.clone()]).unwrap().width(), 2 * one.width());
+        assert_eq!(side_by_side(&[one.clone(), one.clone()]).unwrap().width(), 2 * one.width());
         assert!(SurfacePicture::new(&tube, &colours[1..]).render().is_err());
         assert!(
             SurfacePicture { view: DVec3::ZERO, ..SurfacePicture::new(&tube, &colours) }
                 .png()
                 .is_err()
         );
-        assert!(beside(&[]).is_err());
+        assert!(side_by_side(&[]).is_err());
     }
 }

@@ -69,30 +69,30 @@ struct Pen {
 }
 
 impl Pen {
-    /// Font units run up the page, pixels down.
-    fn place(&self, x: f32, y: f32) -> Vec2 {
+    /// A point of the glyph: font units run up the page, pixels down.
+    fn to_pixels(&self, x: f32, y: f32) -> Vec2 {
         self.at + Vec2::new(self.scale, -self.scale) * Vec2::new(x, y)
     }
 }
 
 impl OutlineBuilder for Pen {
     fn move_to(&mut self, x: f32, y: f32) {
-        self.start = self.place(x, y);
+        self.start = self.to_pixels(x, y);
         self.path.move_to(self.start.x, self.start.y);
     }
 
     fn line_to(&mut self, x: f32, y: f32) {
-        let p = self.place(x, y);
+        let p = self.to_pixels(x, y);
         self.path.line_to(p.x, p.y);
     }
 
     fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        let [p, q] = [(x1, y1), (x, y)].map(|(x, y)| self.place(x, y));
+        let [p, q] = [(x1, y1), (x, y)].map(|(x, y)| self.to_pixels(x, y));
         self.path.quad_to(p.x, p.y, q.x, q.y);
     }
 
     fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        let [p, q, r] = [(x1, y1), (x2, y2), (x, y)].map(|(x, y)| self.place(x, y));
+        let [p, q, r] = [(x1, y1), (x2, y2), (x, y)].map(|(x, y)| self.to_pixels(x, y));
         self.path.cubic_to(p.x, p.y, q.x, q.y, r.x, r.y);
     }
 

@@ -68,37 +68,37 @@ pub struct ProfilePoint {
     pub normal_curvature_per_m: f64,
 }
 
-/// A short straight piece of a line, measured at its middle.
-struct Piece {
+/// A short straight segment of a line, measured at its middle.
+struct Segment {
     /// Length on the surface, m.
     length: f64,
     /// Plan length, m.
-    plan: f64,
+    plan_length: f64,
     /// Rise, m.
     rise: f64,
     /// Slope across, as a tangent.
-    side: f64,
+    side_slope: f64,
     /// Normal curvature, 1/m.
     curvature: f64,
 }
 
-impl Piece {
+impl Segment {
     fn new(surface: &dyn Surface, from: DVec2, to: DVec2) -> Self {
         let middle = from.midpoint(to);
         let by = (to - from) * surface.axes(middle.y);
         let jet = surface.jet(middle);
-        let Course { side, curvature, .. } = Course::new(&jet, by);
+        let DirectionalShape { side_slope, curvature, .. } = DirectionalShape::new(&jet, by);
         let chord = surface.point(to) - surface.point(from);
         let rise = chord.z;
-        let (plan, length) = match jet {
+        let (plan_length, length) = match jet {
             Jet::Height(_) => (by.length(), by.length().hypot(rise)),
             Jet::Space(_) => (chord.truncate().length(), length_in_space(surface, &[from, to])),
         };
-        Self { length, plan, rise, side, curvature }
+        Self { length, plan_length, rise, side_slope, curvature }
     }
 
     fn grade_percent(&self) -> f64 {
-        if self.plan > 0.0 { 100.0 * self.rise / self.plan } else { 0.0 }
+        if self.plan_length > 0.0 { 100.0 * self.rise / self.plan_length } else { 0.0 }
     }
 }
 
@@ -108,20 +108,20 @@ fn length_in_space(surface: &dyn Surface, line: &[DVec2]) -> f64 {
 }
 
 /// Slopes and curvature of the surface along a direction.
-struct Course {
+struct DirectionalShape {
     /// Rise per plan length along it.
     grade: f64,
     /// The same across it, without a sign.
-    side: f64,
+    side_slope: f64,
     /// Normal curvature `vᵀBv / vᵀGv`, 1/m.
     curvature: f64,
 }
 
-impl Course {
+impl DirectionalShape {
     /// Along a step `v` in the axes of the jet; all 0 for no step.
     fn new(jet: &Jet, v: DVec2) -> Self {
         let Some(t) = v.try_normalize() else {
-            return Self { grade: 0.0, side: 0.0, curvature: 0.0 };
+            return Self { grade: 0.0, side_slope: 0.0, curvature: 0.0 };
         };
         match jet {
             Jet::Height(jet) => {
@@ -130,21 +130,21 @@ impl Course {
                 let bend = jet.zxx * t.x * t.x + 2.0 * jet.zxy * t.x * t.y + jet.zyy * t.y * t.y;
                 let w = (1.0 + gradient.length_squared()).sqrt();
                 let curvature = bend / (w * (1.0 + grade * grade));
-                Self { grade, side: gradient.perp_dot(t).abs(), curvature }
+                Self { grade, side_slope: gradient.perp_dot(t).abs(), curvature }
             }
             Jet::Space(space) => {
                 let tangent = space.first[0] * t.x + space.first[1] * t.y;
-                let plan = tangent.truncate();
-                let side = jet.gradient().perp_dot(plan.normalize_or_zero()).abs();
-                let grade = tangent.z / plan.length();
-                Self { grade, side, curvature: jet.normal_curvature(t) }
+                let level = tangent.truncate();
+                let side_slope = jet.gradient().perp_dot(level.normalize_or_zero()).abs();
+                let grade = tangent.z / level.length();
+                Self { grade, side_slope, curvature: jet.normal_curvature(t) }
             }
         }
     }
 }
 
-/// Cuts a line into straight pieces of at most `longest` cells.
-fn pieces(line: &[DVec2], longest: f64) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+/// Cuts a line into straight segments of at most `longest` cells.
+fn segments(line: &[DVec2], longest: f64) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
     line.windows(2).flat_map(move |ends| {
         let count = (ends[0].distance(ends[1]) / longest).ceil().max(1.0);
         let at = move |i: usize| ends[0].lerp(ends[1], i as f64 / count);
@@ -152,8 +152,8 @@ fn pieces(line: &[DVec2], longest: f64) -> impl Iterator<Item = (DVec2, DVec2)> 
     })
 }
 
-/// Pieces of half a cell: the surface has no detail below a cell.
-const PIECE_CELLS: f64 = 0.5;
+/// Segments of half a cell: the surface has no detail below a cell.
+const SEGMENT_CELLS: f64 = 0.5;
 
 impl Summary {
     pub(super) fn measure(line: &[DVec2], metric: &MetricField<'_>) -> Self {
@@ -178,16 +178,17 @@ impl Summary {
             goal: map(line.last()),
             software: concat!("ridgeway ", env!("CARGO_PKG_VERSION")).to_owned(),
         };
-        for (from, to) in pieces(line, PIECE_CELLS) {
-            let piece = Piece::new(surface, from, to);
-            summary.length_m += piece.length;
-            summary.plan_length_m += piece.plan;
-            summary.climb_m += piece.rise.max(0.0);
-            summary.descent_m += (-piece.rise).max(0.0);
-            summary.max_grade_percent = summary.max_grade_percent.max(piece.grade_percent().abs());
+        for (from, to) in segments(line, SEGMENT_CELLS) {
+            let segment = Segment::new(surface, from, to);
+            summary.length_m += segment.length;
+            summary.plan_length_m += segment.plan_length;
+            summary.climb_m += segment.rise.max(0.0);
+            summary.descent_m += (-segment.rise).max(0.0);
+            summary.max_grade_percent =
+                summary.max_grade_percent.max(segment.grade_percent().abs());
             summary.max_side_slope_deg =
-                summary.max_side_slope_deg.max(piece.side.atan().to_degrees());
-            summary.total_normal_curvature_rad += piece.curvature.abs() * piece.length;
+                summary.max_side_slope_deg.max(segment.side_slope.atan().to_degrees());
+            summary.total_normal_curvature_rad += segment.curvature.abs() * segment.length;
         }
         if summary.plan_length_m > 0.0 {
             summary.mean_grade_percent =
@@ -203,9 +204,9 @@ impl Route {
     #[must_use]
     pub fn profile(&self, surface: &dyn Surface, step: f64) -> Vec<ProfilePoint> {
         let mut knots = vec![(0.0, self.grid[0])];
-        for (from, to) in pieces(&self.grid, PIECE_CELLS) {
+        for (from, to) in segments(&self.grid, SEGMENT_CELLS) {
             let (travelled, _) = knots[knots.len() - 1];
-            knots.push((travelled + Piece::new(surface, from, to).length, to));
+            knots.push((travelled + Segment::new(surface, from, to).length, to));
         }
         let total = knots[knots.len() - 1].0;
         let count = (total / step).ceil().clamp(1.0, MAX_STEPS);
@@ -234,15 +235,15 @@ fn sample(
     let share = if after > before { (distance - before) / (after - before) } else { 0.0 };
     let at = from.lerp(to, share);
     let jet = surface.jet(at);
-    let course = Course::new(&jet, (to - from) * surface.axes(at.y));
+    let shape = DirectionalShape::new(&jet, (to - from) * surface.axes(at.y));
     let DVec3 { x, y, z } = surface.point(at);
     ProfilePoint {
         distance_m: distance,
         x,
         y,
         height_m: z,
-        grade_percent: 100.0 * course.grade,
-        side_slope_deg: course.side.atan().to_degrees(),
-        normal_curvature_per_m: course.curvature,
+        grade_percent: 100.0 * shape.grade,
+        side_slope_deg: shape.side_slope.atan().to_degrees(),
+        normal_curvature_per_m: shape.curvature,
     }
 }

@@ -108,10 +108,10 @@ impl Synthetic {
     /// Heights at the nodes in metres, row by row from the north.
     #[must_use]
     pub fn heights(&self) -> Vec<f64> {
-        self.heights_under(&Control::default()).expect("nobody cancels")
+        self.heights_with(&Control::default()).expect("nobody cancels")
     }
 
-    fn heights_under(&self, control: &Control) -> Result<Vec<f64>> {
+    fn heights_with(&self, control: &Control) -> Result<Vec<f64>> {
         let mut heights = vec![0.0; self.cols * self.rows];
         heights.par_chunks_mut(self.cols).enumerate().try_for_each(|(row, line)| {
             control.check()?;
@@ -129,14 +129,14 @@ impl Synthetic {
     /// # Errors
     /// [`Error::Argument`] if `crs` is not a plane one in metres or feet, or `centre` is not finite.
     pub fn terrain(&self, crs: Crs, centre: DVec2) -> Result<Terrain> {
-        self.terrain_under(crs, centre, &Control::default())
+        self.terrain_with(crs, centre, &Control::default())
     }
 
     /// [`terrain`](Self::terrain) that can be cancelled.
     ///
     /// # Errors
     /// As [`terrain`](Self::terrain); cancelled.
-    pub fn terrain_under(&self, crs: Crs, centre: DVec2, control: &Control) -> Result<Terrain> {
+    pub fn terrain_with(&self, crs: Crs, centre: DVec2, control: &Control) -> Result<Terrain> {
         let Ground::Plane { metres_per_unit } = crs.ground() else {
             let expected = "a plane one in metres or feet, such as that of a UTM zone";
             return Err(Error::argument("the CRS of a synthetic terrain", crs.name(), expected));
@@ -144,7 +144,7 @@ impl Synthetic {
         let north_west = centre + self.position(0, 0) / metres_per_unit;
         let step = DVec2::splat(self.spacing / metres_per_unit);
         let frame = GridFrame::new(self.cols, self.rows, north_west, step, crs.ground())?;
-        Terrain::new(frame, self.heights_under(control)?, crs)
+        Terrain::new(frame, self.heights_with(control)?, crs)
     }
 }
 
@@ -158,7 +158,7 @@ mod tests {
         let range = Synthetic::new(SyntheticKind::Range, 9, 9, 30.0).unwrap();
         let control = Control::default();
         control.cancel.cancel();
-        let terrain = range.terrain_under(Crs::none(), DVec2::ZERO, &control);
+        let terrain = range.terrain_with(Crs::none(), DVec2::ZERO, &control);
         assert!(matches!(terrain, Err(Error::Cancelled)));
     }
 

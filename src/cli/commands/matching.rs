@@ -6,16 +6,17 @@ use glam::DVec2;
 use image::RgbaImage;
 use ridgeway::plan::{MatchReport, MatchedSurface, Scenario};
 use ridgeway::region::{
-    Level, Match, Neighbours, Signature, matches, matches_within, outlines, signatures,
+    Level, Match, Neighbours, Signature, match_regions, match_regions_within, outlines, signatures,
 };
 use ridgeway::render::{
-    LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, beside, encode_png, pair_colour,
+    LogPlot, MapPicture, Mark, RegionLayer, Rgb, SurfacePicture, encode_png, pair_colour,
+    side_by_side,
 };
 use ridgeway::surface::{NurbsGrid, NurbsSurface};
 use ridgeway::{Control, Modifiers, Surface, Terrain};
 
 use super::render::title;
-use super::segment::{Sampled, cut};
+use super::segment::{SampledMetric, cut};
 use crate::args::{CURVATURE, MatchArgs, RunArgs, metric_named};
 use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
@@ -34,32 +35,32 @@ pub(super) fn run(args: &MatchArgs, run: &RunArgs, control: &Control) -> Result<
     if let Some(folder) = &args.output {
         check_outputs_in(folder, &FILES, args.overwrite)?;
     }
-    let subjects = args
+    let surfaces = args
         .surfaces
         .iter()
-        .map(|path| Subject::open(path, args, run, control))
+        .map(|path| SegmentedSurface::open(path, args, run, control))
         .collect::<Result<Vec<_>>>()?;
-    let found = match &subjects[..] {
-        [one] => matches_within(&one.signatures, args.sized)?,
-        [first, second] => matches(&first.signatures, &second.signatures, args.sized)?,
+    let found = match &surfaces[..] {
+        [one] => match_regions_within(&one.signatures, args.sized)?,
+        [first, second] => match_regions(&first.signatures, &second.signatures, args.sized)?,
         _ => return Err(Failure::usage("match compares one surface with itself, or two")),
     };
-    let surfaces = subjects.iter().map(Subject::record).collect();
-    let report = MatchReport::new(surfaces, &found, Some(command_line()));
+    let records = surfaces.iter().map(SegmentedSurface::record).collect();
+    let report = MatchReport::new(records, &found, Some(command_line()));
     if let Some(folder) = &args.output {
-        let colours = colours(&subjects, &found);
+        let colours = colours(&surfaces, &found);
         let contents =
-            [json(&report).into_bytes(), regions(&subjects, &colours)?, plot(&subjects, &colours)?];
+            [json(&report).into_bytes(), regions(&surfaces, &colours)?, plot(&surfaces, &colours)?];
         control.check()?;
         write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
     let written = args.output.iter().map(|folder| wrote_in(folder, &FILES));
-    let text = table(&subjects, &found) + &written.collect::<String>();
+    let text = table(&surfaces, &found) + &written.collect::<String>();
     Report::new(text, report).print(run)
 }
 
 /// A surface cut into regions.
-struct Subject<'a> {
+struct SegmentedSurface<'a> {
     path: &'a Path,
     source: Source,
     /// The finest level.
@@ -73,7 +74,7 @@ enum Source {
     Nurbs(Box<NurbsGrid>),
 }
 
-impl<'a> Subject<'a> {
+impl<'a> SegmentedSurface<'a> {
     /// Reads a surface and cuts it.
     ///
     /// # Errors
@@ -135,7 +136,7 @@ impl<'a> Subject<'a> {
     }
 }
 
-fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Source, Sampled)> {
+fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Source, SampledMetric)> {
     if let Some(flag) = args.ground.metric.dem_only_flag() {
         let name = path.display();
         return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
@@ -143,7 +144,8 @@ fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Sourc
     let (cols, rows) = args.nodes;
     let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
     let metric = args.ground.metric.metric(args.metric.unwrap_or(metric_named(CURVATURE)), None)?;
-    let sampled = Sampled::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
+    let sampled =
+        SampledMetric::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
     Ok((Source::Nurbs(Box::new(surface)), sampled))
 }
 
@@ -152,12 +154,12 @@ fn open_dem(
     args: &MatchArgs,
     run: &RunArgs,
     control: &Control,
-) -> Result<(Source, Sampled)> {
+) -> Result<(Source, SampledMetric)> {
     let name = args.ground.metric.chosen(args.metric)?;
     let places = (&[][..], &[][..]);
     let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
-    let sampled = Sampled::of(&metric, control)?;
+    let sampled = SampledMetric::of(&metric, control)?;
     drop(metric);
     Ok((Source::Heights(Box::new(scenario), Box::new(terrain)), sampled))
 }
@@ -171,38 +173,39 @@ impl Source {
     }
 }
 
-/// The place of the second surface of a match among the subjects.
-fn second(subjects: &[Subject<'_>]) -> usize {
-    subjects.len() - 1
+/// The index of the second surface of a match: that of the only one where it is compared with itself.
+fn second(surfaces: &[SegmentedSurface<'_>]) -> usize {
+    surfaces.len() - 1
 }
 
 /// Colour of each region of each surface: one for the regions of a match.
-fn colours(subjects: &[Subject<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
-    let unmatched = |subject: &Subject<'_>| vec![pair_colour(None); subject.signatures.len()];
-    let mut colours: Vec<_> = subjects.iter().map(unmatched).collect();
+fn colours(surfaces: &[SegmentedSurface<'_>], found: &[Match]) -> Vec<Vec<Rgb>> {
+    let unmatched =
+        |surface: &SegmentedSurface<'_>| vec![pair_colour(None); surface.signatures.len()];
+    let mut colours: Vec<_> = surfaces.iter().map(unmatched).collect();
     for (rank, pair) in found.iter().enumerate() {
         colours[0][pair.first] = pair_colour(Some(rank));
-        colours[second(subjects)][pair.second] = pair_colour(Some(rank));
+        colours[second(surfaces)][pair.second] = pair_colour(Some(rank));
     }
     colours
 }
 
 /// The surfaces side by side.
-fn regions(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
-    let pictures = subjects.iter().zip(colours).map(|(subject, colours)| subject.picture(colours));
-    encode_png(&beside(&pictures.collect::<ridgeway::Result<Vec<_>>>()?)?)
+fn regions(surfaces: &[SegmentedSurface<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
+    let pictures = surfaces.iter().zip(colours).map(|(surface, colours)| surface.picture(colours));
+    encode_png(&side_by_side(&pictures.collect::<ridgeway::Result<Vec<_>>>()?)?)
 }
 
 /// The two largest eigenvalues of all regions.
-fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
+fn plot(surfaces: &[SegmentedSurface<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<u8>> {
     let mut plot = LogPlot {
-        kinds: subjects.iter().map(|subject| title(subject.path)).collect(),
+        kinds: surfaces.iter().map(|surface| title(surface.path)).collect(),
         axes: ["λ1".into(), "λ2".into()],
         title: "Signatures; one colour: matched".into(),
         ..LogPlot::default()
     };
-    for (kind, (subject, colours)) in subjects.iter().zip(colours).enumerate() {
-        let marks = subject.signatures.iter().zip(colours).enumerate();
+    for (kind, (surface, colours)) in surfaces.iter().zip(colours).enumerate() {
+        let marks = surface.signatures.iter().zip(colours).enumerate();
         plot.marks.extend(marks.map(|(i, (signature, &colour))| {
             let [x, y, ..] = signature.eigenvalues;
             Mark { at: DVec2::new(x, y), colour, kind, label: (i + 1).to_string() }
@@ -211,15 +214,15 @@ fn plot(subjects: &[Subject<'_>], colours: &[Vec<Rgb>]) -> ridgeway::Result<Vec<
     plot.png()
 }
 
-fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
+fn table(surfaces: &[SegmentedSurface<'_>], found: &[Match]) -> String {
     let mut text = String::new();
-    for subject in subjects {
-        let count = subject.signatures.len();
+    for surface in surfaces {
+        let count = surface.signatures.len();
         let noun = if count == 1 { "region" } else { "regions" };
-        text += &format!("{}: {count} {noun}\n", title(subject.path));
+        text += &format!("{}: {count} {noun}\n", title(surface.path));
     }
     if found.is_empty() {
-        let regions: usize = subjects.iter().map(|subject| subject.signatures.len()).sum();
+        let regions: usize = surfaces.iter().map(|surface| surface.signatures.len()).sum();
         return text
             + match regions {
                 0 | 1 => "one region alone matches none; cut finer by --epsilon or --levels\n",
@@ -230,14 +233,14 @@ fn table(subjects: &[Subject<'_>], found: &[Match]) -> String {
     let header = ["", "first", "second", "unlike", "size", "size", "ratio", "best of all"];
     table.row(header);
     for (i, pair) in found.iter().take(NAMED).enumerate() {
-        let size = |k: usize, region: usize| metres(subjects[k].signatures[region].size);
+        let size = |k: usize, region: usize| metres(surfaces[k].signatures[region].size);
         table.row([
             (i + 1).to_string(),
             (pair.first + 1).to_string(),
             (pair.second + 1).to_string(),
             format!("{:.3}", pair.distance),
             size(0, pair.first),
-            size(second(subjects), pair.second),
+            size(second(surfaces), pair.second),
             digits(pair.size_ratio),
             if pair.mutual { "yes" } else { "no" }.to_owned(),
         ]);

@@ -6,7 +6,8 @@ use ridgeway::eikonal::TensorField;
 use ridgeway::export::{Samples, regions_geojson};
 use ridgeway::plan::{Provenance, RegionRecord, Scenario, SegmentReport, coordinate};
 use ridgeway::region::{
-    Level, Neighbours, RegionStatistics, Segmentation, Signature, outlines, signatures, statistics,
+    Level, Neighbours, RegionStatistics, Segmentation, Signature, outlines, region_statistics,
+    signatures,
 };
 use ridgeway::render::{MapPicture, RegionLayer, contrasting_colours};
 use ridgeway::{Control, HeightSurface, MetricField, Solver, Surface, Terrain};
@@ -34,7 +35,7 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
     let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let relief = formats.iter().any(|format| format == "png").then_some(terrain);
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
-    let sampled = Sampled::of(&metric, control)?;
+    let sampled = SampledMetric::of(&metric, control)?;
     let (regions, solver) = (&args.regions, args.ground.metric.solver());
     let segmentation = cut(&scenario.surface, sampled, regions, solver, control)?;
     let measures = measures(&segmentation, &scenario.surface, control)?;
@@ -63,12 +64,12 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
 }
 
 /// A metric at the nodes of a surface, and the order in which these are tried as seeds.
-pub(super) struct Sampled {
+pub(super) struct SampledMetric {
     ranks: Vec<f64>,
     field: TensorField,
 }
 
-impl Sampled {
+impl SampledMetric {
     pub(super) fn of(metric: &MetricField<'_>, control: &Control) -> ridgeway::Result<Self> {
         Ok(Self { ranks: metric.seed_ranks(), field: TensorField::sample(metric, control)? })
     }
@@ -80,7 +81,7 @@ impl Sampled {
 /// Radii that do not fall; too many or no regions; cancelled.
 pub(super) fn cut(
     surface: &dyn Surface,
-    Sampled { ranks, field }: Sampled,
+    SampledMetric { ranks, field }: SampledMetric,
     regions: &RegionArgs,
     solver: Solver,
     control: &Control,
@@ -88,7 +89,7 @@ pub(super) fn cut(
     let mut segmentation = Segmentation::of(&field, &ranks, &regions.options(solver), control)?;
     drop((field, ranks));
     if let Some(tolerance) = regions.merge {
-        segmentation.merge_alike(surface, tolerance, control)?;
+        segmentation.merge_similar(surface, tolerance, control)?;
     }
     Ok(segmentation)
 }
@@ -102,7 +103,7 @@ fn measures(
     let of_level = |level: &Level| {
         control.report("measuring", 0.0);
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
-        Ok(statistics(surface, level).into_iter().zip(signatures).collect())
+        Ok(region_statistics(surface, level).into_iter().zip(signatures).collect())
     };
     segmentation.levels.iter().map(of_level).collect()
 }

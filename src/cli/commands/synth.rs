@@ -47,7 +47,7 @@ fn terrain(args: &SynthArgs, kind: SyntheticKind, control: &Control) -> Result<T
     let crs = args.crs.map_or_else(|| Ok(Crs::none()), Crs::from_epsg)?;
     let metres = crs.ground().metres_per_unit(args.origin.y);
     let to_centre = synthetic.position(cols - 1, 0) / metres;
-    Ok(synthetic.terrain_under(crs, args.origin + to_centre, control)?)
+    Ok(synthetic.terrain_with(crs, args.origin + to_centre, control)?)
 }
 
 fn list(run: &RunArgs) -> Result<()> {

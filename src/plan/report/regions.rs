@@ -110,8 +110,9 @@ pub struct MatchedPair {
     pub first: usize,
     /// Number of the region of the second surface.
     pub second: usize,
-    /// How unlike they are, 0 to 1, see [`Match::distance`].
-    pub unlikeness: f64,
+    /// How unlike they are, 0 to 1, see [`Match::distance`]; files have it under the name of their first version.
+    #[serde(rename = "unlikeness")]
+    pub dissimilarity: f64,
     /// Size of the second as a multiple of the first's.
     pub size_ratio: f64,
     /// Whether each is the most similar to the other of all.
@@ -125,7 +126,7 @@ impl MatchReport {
         let pair = |pair: &Match| MatchedPair {
             first: pair.first + 1,
             second: pair.second + 1,
-            unlikeness: pair.distance,
+            dissimilarity: pair.distance,
             size_ratio: pair.size_ratio,
             mutual: pair.mutual,
         };

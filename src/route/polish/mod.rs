@@ -107,8 +107,8 @@ fn fine_length(line: &[DVec2], metric: &impl Fn(DVec2) -> Sym2) -> f64 {
     length_along(line, |at, by| metric(at).norm(by))
 }
 
-/// Unit vectors across the line, in grid coordinates.
-fn across(points: &[DVec2]) -> Vec<DVec2> {
+/// Unit normals of a line at its points, in grid coordinates.
+fn normals(points: &[DVec2]) -> Vec<DVec2> {
     let last = points.len() - 1;
     (0..points.len())
         .map(|i| (points[last.min(i + 1)] - points[i.saturating_sub(1)]).perp().normalize_or_zero())

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::{MOST_STEPS, across};
+use super::{MOST_STEPS, normals};
 use crate::linalg::Sym2;
 
 /// Step in cells of the differences of the metric across the line. The curvature tensor has kinks where a curvature
@@ -76,10 +76,10 @@ impl<M: Fn(DVec2) -> Sym2, C: Fn(DVec2, DVec2) -> bool> Relaxation<'_, M, C> {
     /// A Newton step from a line of this length, with ever larger shifts until it makes the line shorter; `None` if none
     /// does.
     fn step(&mut self, length: f64) -> Option<Move> {
-        let across = across(self.points);
-        let newton = Newton::new(self.points, &across, &self.middles, self.metric);
+        let normals = normals(self.points);
+        let newton = Newton::new(self.points, &normals, &self.middles, self.metric);
         loop {
-            match self.attempt(&newton, &across, length) {
+            match self.attempt(&newton, &normals, length) {
                 Attempt::Shorter(moved) => return Some(moved),
                 Attempt::Noise => return None,
                 Attempt::Blocked => continue,
@@ -92,11 +92,11 @@ impl<M: Fn(DVec2) -> Sym2, C: Fn(DVec2, DVec2) -> bool> Relaxation<'_, M, C> {
     }
 
     /// The step with the shift as it is; the line takes it if it becomes no longer.
-    fn attempt(&mut self, newton: &Newton, across: &[DVec2], length: f64) -> Attempt {
+    fn attempt(&mut self, newton: &Newton, normals: &[DVec2], length: f64) -> Attempt {
         let Some(mut step) = newton.step(self.shift, &self.held) else { return Attempt::Longer };
         let farthest = step.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
         shorten(&mut step, (LONGEST_MOVE / farthest).min(1.0));
-        let moved = advance(self.points, across, &mut step, &mut self.held, self.clear);
+        let moved = advance(self.points, normals, &mut step, &mut self.held, self.clear);
         let Some(moved) = moved else { return Attempt::Blocked };
         let middles = at_middles(&moved, self.metric);
         let gained = length - self::length(&moved, &middles);
@@ -117,7 +117,7 @@ fn shorten(step: &mut [f64], share: f64) {
 /// in the way are held from now on.
 fn advance(
     points: &[DVec2],
-    across: &[DVec2],
+    normals: &[DVec2],
     step: &mut [f64],
     held: &mut [bool],
     clear: &impl Fn(DVec2, DVec2) -> bool,
@@ -127,7 +127,7 @@ fn advance(
     let mut hits = Vec::new();
     for _ in 0..=HALVINGS {
         let moved: Vec<DVec2> =
-            points.iter().zip(across).zip(&*step).map(|((p, n), &s)| p + n * s).collect();
+            points.iter().zip(normals).zip(&*step).map(|((p, n), &s)| p + n * s).collect();
         let moves = |k: usize| step[k] != 0.0 || step[k + 1] != 0.0;
         hits =
             (0..points.len() - 1).filter(|&k| moves(k) && !clear(moved[k], moved[k + 1])).collect();
@@ -165,7 +165,7 @@ struct Newton {
 impl Newton {
     fn new(
         points: &[DVec2],
-        across: &[DVec2],
+        normals: &[DVec2],
         middles: &[Sym2],
         metric: &impl Fn(DVec2) -> Sym2,
     ) -> Self {
@@ -173,7 +173,7 @@ impl Newton {
         let mut sums =
             Self { gradient: zeros(), diagonal: zeros(), off_diagonal: zeros(), tension: zeros() };
         for (k, &middle) in middles.iter().enumerate() {
-            sums.add(k, [points[k], points[k + 1]], [across[k], across[k + 1]], middle, metric);
+            sums.add(k, [points[k], points[k + 1]], [normals[k], normals[k + 1]], middle, metric);
         }
         sums
     }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{MOST_STEPS, across, fine_length, refine};
+use super::{MOST_STEPS, fine_length, normals, refine};
 use crate::linalg::Sym2;
 
 /// Steps of the search in cells. The finer ones are of no use before the coarser.
@@ -20,7 +20,7 @@ pub(super) fn search(
     for stride in STRIDES {
         line = refine(&line);
         for _ in 0..MOST_STEPS {
-            let (length, moved) = best_beside(&line, stride, metric, clear);
+            let (length, moved) = best_displaced(&line, stride, metric, clear);
             if length.is_nan() || length >= (1.0 - WORTH) * least {
                 break;
             }
@@ -31,40 +31,46 @@ pub(super) fn search(
 }
 
 /// The shortest of the lines whose points each stay or go a stride to either side, and its length: the best path to each
-/// place of a point goes by the best path to a place of the point before it.
-fn best_beside(
+/// candidate of a point goes by the best path to a candidate of the point before it.
+fn best_displaced(
     line: &[DVec2],
     stride: f64,
     metric: &impl Fn(DVec2) -> Sym2,
     clear: &impl Fn(DVec2, DVec2) -> bool,
 ) -> (f64, Vec<DVec2>) {
     let last = line.len() - 1;
-    let across = across(line);
-    let stride_across = |i: usize| if i > 0 && i < last { across[i] * stride } else { DVec2::ZERO };
-    // The first place is to stay: that is always allowed, and wins where nothing is gained.
-    let places = |i: usize| [0.0, 1.0, -1.0].map(|side| line[i] + stride_across(i) * side);
+    let mut strides: Vec<DVec2> = normals(line).iter().map(|normal| normal * stride).collect();
+    (strides[0], strides[last]) = (DVec2::ZERO, DVec2::ZERO);
+    let candidates = |i: usize| candidates(line[i], strides[i]);
     let mut lengths = [0.0; 3];
     let mut predecessors = Vec::with_capacity(last);
     for i in 1..line.len() {
-        let (from, to) = (places(i - 1), places(i));
-        let path = |j: usize, k: usize| {
-            let open = (j, k) == (0, 0) || clear(from[j], to[k]);
-            if open { lengths[j] + fine_length(&[from[j], to[k]], metric) } else { f64::INFINITY }
-        };
+        let (from, to) = (candidates(i - 1), candidates(i));
         let best = [0, 1, 2].map(|k| {
-            let paths = [0, 1, 2].map(|j| path(j, k));
+            let paths = [0, 1, 2].map(|j| match (j, k) == (STAY, STAY) || clear(from[j], to[k]) {
+                true => lengths[j] + fine_length(&[from[j], to[k]], metric),
+                false => f64::INFINITY,
+            });
             let least = (1..3).fold(0, |best, j| if paths[j] < paths[best] { j } else { best });
             (paths[least], least)
         });
         lengths = best.map(|(length, _)| length);
         predecessors.push(best.map(|(_, predecessor)| predecessor));
     }
-    let mut place = 0;
+    let mut candidate = STAY;
     let mut moved = vec![line[last]];
     for (i, predecessors) in predecessors.iter().enumerate().rev() {
-        place = predecessors[place];
-        moved.push(places(i)[place]);
+        candidate = predecessors[candidate];
+        moved.push(candidates(i)[candidate]);
     }
     moved.reverse();
-    (lengths[0], moved)
+    (lengths[STAY], moved)
+}
+
+/// The first of the [`candidates`] of a point: always allowed, and the best where nothing is gained.
+const STAY: usize = 0;
+
+/// Where a point may go: it stays, or moves a stride to either side.
+fn candidates(point: DVec2, stride: DVec2) -> [DVec2; 3] {
+    [0.0, 1.0, -1.0].map(|side| point + stride * side)
 }
