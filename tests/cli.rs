@@ -434,7 +434,7 @@ fn bad_input_is_named() {
         "route plain.tif --start huts.geojson --goal pixel:3,4",
         2,
         "huts.geojson: the CRS is unknown; it must be one that leads to longitude and latitude; \
-         use map or grid coordinates, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+         use map or grid coordinates, or set its CRS with `gdal_edit.py -a_srs EPSG:... FILE.tif`",
     );
 }
 
@@ -529,7 +529,7 @@ fn places_off_the_ground_are_explained() {
         "route plain.tif --start lonlat:1,2 --goal pixel:4,1",
         2,
         "the CRS is unknown; it must be one that leads to longitude and latitude; use map or grid \
-         coordinates, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
+         coordinates, or set its CRS with `gdal_edit.py -a_srs EPSG:... FILE.tif`",
     );
     folder.bad(
         "route range.tif --start pixel:3,3 --goal wall.geojson",

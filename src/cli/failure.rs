@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 
 use ridgeway::Error;
-use ridgeway::error::{Location, Obstacle, PlaceError, PlaceErrorKind};
+use ridgeway::error::{Location, Obstacle, PlaceError, PlaceErrorKind, Remedy};
 use ridgeway::plan::Scenario;
 
 /// `Result` of a command.
@@ -64,9 +64,30 @@ impl From<Error> for Failure {
             }
             Error::Io { source, .. } => (READING_OR_WRITING, advice(source.kind())),
             Error::Place(place) => return Self::usage(refusal(place)),
-            _ => (WRONG_USE, ""),
+            _ => (WRONG_USE, error.remedy().map_or("", tool)),
         };
         Self { message: format!("{error}{advice}"), code }
+    }
+}
+
+/// The tool for a remedy: how the sentence of the error goes on.
+fn tool(remedy: Remedy) -> &'static str {
+    match remedy {
+        Remedy::Convert => " with `gdal_translate IN OUT.tif`",
+        Remedy::ConvertSamples => " with `gdal_translate -ot Float32 IN OUT.tif`",
+        Remedy::Recompress => " with `gdal_translate -co COMPRESS=DEFLATE IN OUT.tif`",
+        Remedy::TakeBand => " with `gdal_translate -b N IN OUT.tif`",
+        Remedy::TurnNorthUp => " with `gdalwarp -r bilinear IN OUT.tif`",
+        Remedy::Rectify => " with `gdalwarp -tps IN OUT.tif`",
+        Remedy::Reproject => " with `gdalwarp -t_srs EPSG:... IN OUT.tif`",
+        Remedy::ReprojectToLonLat => " with `gdalwarp -t_srs EPSG:4326 IN OUT.tif`",
+        Remedy::SetCrs => " with `gdal_edit.py -a_srs EPSG:... FILE.tif`",
+        Remedy::ReplaceWkt => ", which `gdalsrsinfo -o wkt1 EPSG:...` prints",
+        Remedy::ScaleToMetres => ", for example with `gdal_calc.py`",
+        Remedy::ResampleToDem => ", for example with `gdalwarp -te -ts`",
+        Remedy::Unpack => ", for example with `gunzip` or `unzip`",
+        Remedy::FetchFromLfs => " with `git lfs pull`",
+        _ => "",
     }
 }
 

@@ -4,6 +4,8 @@ use std::fmt;
 
 use glam::{DVec2, DVec3};
 
+use super::advice::Advice;
+
 /// Something that is not as it must be: `what`, at a place, is `found` and must be `expected`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -17,7 +19,7 @@ pub struct Mismatch {
     /// What it must be; `None` if that goes without saying, as of a damaged archive.
     pub expected: Option<String>,
     /// What to do, where that is known.
-    pub advice: Option<String>,
+    pub advice: Option<Advice>,
 }
 
 /// Where in an input something stands.
@@ -46,7 +48,7 @@ impl Mismatch {
     pub(super) fn clauses(&self) -> (String, String) {
         let found = format!("{}{} is {}", self.what, at_clause(self.at), self.found);
         let expected = self.expected.iter().map(|expected| format!("it must be {expected}"));
-        let advice: Vec<_> = expected.chain(self.advice.clone()).collect();
+        let advice: Vec<_> = expected.chain(self.advice.iter().map(Advice::to_string)).collect();
         (found, advice.join("; "))
     }
 }

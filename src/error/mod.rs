@@ -9,6 +9,7 @@
 //! assert_eq!(mismatch.at, Some(Location::Node { col: 3, row: 4 }));
 //! ```
 
+mod advice;
 mod mismatch;
 mod place;
 
@@ -16,6 +17,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use self::advice::{Advice, Remedy};
 use self::mismatch::at_clause;
 pub use self::mismatch::{Location, Mismatch};
 pub use self::place::{Obstacle, PlaceError, PlaceErrorKind, Role};
@@ -36,14 +38,14 @@ pub enum Error {
         mismatch: Box<Mismatch>,
     },
     /// A file is in order but holds something that this crate does not read or write.
-    #[error("{}: {found}{}", path.display(), clause(advice))]
+    #[error("{}: {found}{}", path.display(), advice_clause(advice))]
     Unsupported {
         /// The file.
         path: PathBuf,
         /// What it holds.
         found: String,
         /// How to make a file of it that can be read.
-        advice: String,
+        advice: Advice,
     },
     /// The caller asked for something impossible: a place outside the grid, a negative length, …
     #[error("{0}")]
@@ -131,7 +133,7 @@ impl Error {
     pub fn unsupported(
         path: impl AsRef<Path>,
         found: impl Into<String>,
-        advice: impl Into<String>,
+        advice: impl Into<Advice>,
     ) -> Self {
         Self::Unsupported {
             path: path.as_ref().to_path_buf(),
@@ -162,11 +164,23 @@ impl Error {
 
     /// Says what to do: for [`Error::Argument`] and [`Error::Format`]; the others stay as they are.
     #[must_use]
-    pub fn advise(mut self, advice: impl Into<String>) -> Self {
+    pub fn advise(mut self, advice: impl Into<Advice>) -> Self {
         if let Self::Argument(mismatch) | Self::Format { mismatch, .. } = &mut self {
             mismatch.advice = Some(advice.into());
         }
         self
+    }
+
+    /// What makes the file usable that this error is about, where that is known. The sentence of the error ends with it.
+    #[must_use]
+    pub fn remedy(&self) -> Option<Remedy> {
+        match self {
+            Self::Argument(mismatch) | Self::Format { mismatch, .. } => {
+                mismatch.advice.as_ref()?.remedy
+            }
+            Self::Unsupported { advice, .. } => advice.remedy,
+            _ => None,
+        }
     }
 
     /// Names the file that the argument came from: an [`Error::Argument`] becomes an [`Error::Format`];
@@ -187,16 +201,17 @@ impl Error {
     pub fn unsupported_in(self, path: impl AsRef<Path>) -> Self {
         match self {
             Self::Argument(mismatch) => {
-                let (found, advice) = mismatch.clauses();
-                Self::unsupported(path, found, advice)
+                let (found, text) = mismatch.clauses();
+                let remedy = mismatch.advice.and_then(|advice| advice.remedy);
+                Self::unsupported(path, found, Advice { text, remedy })
             }
             other => other,
         }
     }
 }
 
-fn clause(text: &str) -> String {
-    if text.is_empty() { String::new() } else { format!("; {text}") }
+fn advice_clause(advice: &Advice) -> String {
+    if advice.text.is_empty() { String::new() } else { format!("; {advice}") }
 }
 
 fn between_clause(between: &[Obstacle]) -> String {
@@ -254,6 +269,18 @@ mod tests {
         );
         let zip = Error::damaged("the zip archive", "no end").in_file("a.zip");
         assert_eq!(zip.to_string(), "a.zip: the zip archive is damaged: no end");
+    }
+
+    #[test]
+    fn sentences_end_with_the_remedy() {
+        let advice = Remedy::SetCrs.after("use map coordinates, or ");
+        let error = Error::argument("the CRS", "unknown", "known").advise(advice).in_file("a.tif");
+        let unsupported =
+            Error::argument("the map", "geocentric", "flat").advise(Remedy::Reproject);
+        for error in [error, unsupported.unsupported_in("a.tif")] {
+            let remedy = error.remedy().unwrap();
+            assert!(error.to_string().ends_with(&remedy.to_string()), "{error}");
+        }
     }
 
     #[test]

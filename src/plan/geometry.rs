@@ -1,7 +1,7 @@
 //! Geometry files.
 
-use std::fs;
 use std::path::Path;
+use std::{fmt, fs};
 
 use geo_types::Geometry;
 use geojson::{GeoJson, GeometryValue, Position};
@@ -16,12 +16,13 @@ use crate::terrain::Georeference;
 /// The file cannot be read, is not GeoJSON, holds no geometry; the grid has no CRS.
 pub fn read_geojson(path: impl AsRef<Path>, georeference: &Georeference) -> Result<Shapes> {
     let path = path.as_ref();
-    let text = fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
-    if text.is_empty() {
+    let bytes = fs::read(path).map_err(|source| Error::io(path, source))?;
+    if bytes.is_empty() {
         return Err(Error::argument("the file", "empty", "GeoJSON").in_file(path));
     }
-    let shapes = lonlat_shapes(&text)
-        .map_err(|error| Error::damaged("the GeoJSON", error).in_file(path))?
+    let text = str::from_utf8(&bytes).map_err(|error| not_geojson(error).in_file(path))?;
+    let shapes = lonlat_shapes(text)
+        .map_err(|error| not_geojson(error).in_file(path))?
         .try_map(|lonlat| georeference.from_lonlat(lonlat))
         .map_err(|error| error.in_file(path))?;
     if shapes.is_empty() {
@@ -30,6 +31,11 @@ pub fn read_geojson(path: impl AsRef<Path>, georeference: &Georeference) -> Resu
         );
     }
     Ok(shapes)
+}
+
+fn not_geojson(cause: impl fmt::Display) -> Error {
+    let expected = "GeoJSON, in longitude and latitude (RFC 7946)";
+    Error::argument("the file", format!("not GeoJSON ({cause})"), expected)
 }
 
 /// All geometry of a GeoJSON text, in longitude and latitude.
@@ -80,6 +86,8 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
+    use crate::grid::{GridFrame, Ground};
+    use crate::terrain::Crs;
 
     #[test]
     fn geojson_gives_all_its_geometry() {
@@ -95,6 +103,20 @@ mod tests {
         let shapes = lonlat_shapes(&text).unwrap();
         assert_eq!(shapes.points, [DVec2::new(1.0, 2.0)]);
         assert_eq!((shapes.lines.len(), shapes.polygons.len()), (1, 1));
+    }
+
+    #[test]
+    fn other_files_are_called_no_geojson() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wall.geojson");
+        let frame = GridFrame::new(3, 3, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap();
+        let georeference = Georeference::new(frame, Crs::none());
+        let contents: [&[u8]; 4] = [b"id,x,y", b"\x89PNG\xff", b"{\"a\": 1}", b"{\"type\": \"Poi"];
+        for content in contents {
+            fs::write(&path, content).unwrap();
+            let message = read_geojson(&path, &georeference).unwrap_err().to_string();
+            assert!(message.contains("the file is not GeoJSON ("), "{message}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::grid::GridFrame;
 use crate::linalg::Sym2;
 use crate::terrain::read_bands;
@@ -51,6 +51,6 @@ fn check_grid(path: &Path, theirs: &GridFrame, ours: &GridFrame) -> Result<()> {
         format!("{cols} x {rows} cells from {},{}", origin.x, origin.y)
     };
     Err(Error::argument("the grid", grid(theirs), format!("that of the DEM, {}", grid(ours)))
-        .advise("resample it to the DEM, for example with `gdalwarp -te -ts`")
+        .advise(Remedy::ResampleToDem)
         .in_file(path))
 }

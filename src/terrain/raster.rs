@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::Crs;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::grid::GridFrame;
 
 /// Makes infinite cells voids too.
@@ -67,7 +67,7 @@ impl Raster {
             return Err(Error::unsupported(
                 path,
                 "the columns run from east to west",
-                "turn the raster with `gdalwarp IN OUT.tif`",
+                Remedy::TurnNorthUp,
             ));
         }
         if self.step.y > 0.0 {

@@ -161,7 +161,7 @@ impl Terrain {
         (least < 1.0 - NOTABLE || most > 1.0 + NOTABLE).then(|| {
             format!(
                 "a metre of this map is {least:.2} to {most:.2} m on the ground, and distances are those of the map; \
-                 reproject with `gdalwarp -t_srs` to longitude and latitude or to the UTM zone for those of the ground"
+                 reproject the DEM to longitude and latitude or to the UTM zone for those of the ground"
             )
         })
     }

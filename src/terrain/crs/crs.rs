@@ -10,7 +10,7 @@ use super::datum_shift::without_shift_grids;
 use super::geo_keys::GeoKeys;
 use super::units::unit_name;
 use super::wkt::{wkt_name, wkt_unit};
-use crate::error::{Error, Location, Result};
+use crate::error::{Error, Location, Remedy, Result};
 use crate::grid::Ground;
 
 /// The coordinate reference system of a terrain.
@@ -76,9 +76,8 @@ impl Crs {
         let code = if matches!(code, 900_913 | 102_100 | 102_113) { 3857 } else { code };
         let definition =
             u16::try_from(code).ok().and_then(crs_definitions::from_code).ok_or_else(|| {
-                Error::argument("the EPSG code", code, "that of a horizontal CRS that is known").advise(
-                    "reproject with `gdalwarp -t_srs EPSG:...` to one that is, such as the UTM zone",
-                )
+                Error::argument("the EPSG code", code, "that of a horizontal CRS that is known")
+                    .advise(Remedy::Reproject)
             })?;
         let (name, wkt) = (wkt_name(definition.wkt), definition.wkt);
         let mut crs = match (Self::from_proj(definition.proj4, name), wkt_unit(wkt)) {
@@ -92,8 +91,9 @@ impl Crs {
         crs.epsg = Some(code);
         if crs.is_geographic() && wkt.contains("UNIT[\"grad\"") {
             let what = format!("the unit of the angles of EPSG:{code}");
-            return Err(Error::argument(what, "the grad", "the degree")
-                .advise("reproject with `gdalwarp -t_srs EPSG:4326`"));
+            return Err(
+                Error::argument(what, "the grad", "the degree").advise(Remedy::ReprojectToLonLat)
+            );
         }
         if code == 3857 {
             crs.ground = Ground::WebMercator;
@@ -114,7 +114,7 @@ impl Crs {
                 "geocentric (X, Y, Z)",
                 "a map",
             )
-            .advise("reproject with `gdalwarp -t_srs EPSG:...`"));
+            .advise(Remedy::Reproject));
         }
         let (ground, unit) = if proj.is_latlong() {
             let (a, b) = proj.ellipse_parameters();
@@ -247,9 +247,8 @@ impl Crs {
                     false => format!("{}, which cannot be projected", self.name()),
                 };
                 let expected = "one that leads to longitude and latitude";
-                Err(Error::argument("the CRS", found, expected).advise(
-                    "use map or grid coordinates, or set a CRS with `gdal_edit.py -a_srs EPSG:...`",
-                ))
+                Err(Error::argument("the CRS", found, expected)
+                    .advise(Remedy::SetCrs.after("use map or grid coordinates, or ")))
             }
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::crs::Crs;
 use super::geo_keys::{GeoKeys, USER_DEFINED, key};
 use super::units::{length_unit, unit_name};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 
 impl Crs {
     /// The CRS that the GeoKeys of a GeoTIFF describe.
@@ -15,7 +15,7 @@ impl Crs {
         let crs = match (keys.short(key::MODEL_TYPE), codes) {
             (Some(3), _) => {
                 return Err(Error::argument("the CRS", "geocentric (X, Y, Z)", "a map")
-                    .advise("reproject with `gdalwarp -t_srs EPSG:...`"));
+                    .advise(Remedy::Reproject));
             }
             (_, [Some(code), _]) => Self::from_epsg(code).or_else(|e| keys.named_crs().ok_or(e))?,
             (Some(2) | None, [None, Some(code)]) => {
@@ -37,14 +37,17 @@ impl GeoKeys {
     fn metres_per_unit(&self) -> Result<f64> {
         match self.short(key::LINEAR_UNITS) {
             None => Some(1.0),
-            Some(USER_DEFINED) => self.double(key::LINEAR_UNIT_SIZE).filter(|m| m.is_finite() && *m > 0.0),
+            Some(USER_DEFINED) => {
+                self.double(key::LINEAR_UNIT_SIZE).filter(|m| m.is_finite() && *m > 0.0)
+            }
             Some(code) => length_unit(code).map(|(_, metres)| metres),
         }
         .ok_or_else(|| {
-            Error::argument("the unit of the map coordinates", "unknown", "a unit of length").advise(
-                "without it the size of a cell on the ground is not known: reproject with `gdalwarp -t_srs EPSG:...`, \
-                 or name the right CRS with `gdal_edit.py -a_srs EPSG:...`",
-            )
+            Error::argument("the unit of the map coordinates", "unknown", "a unit of length")
+                .advise(
+                    Remedy::SetCrs
+                        .after("without it the size of a cell on the ground is not known: "),
+                )
         })
     }
 
@@ -86,11 +89,11 @@ impl GeoKeys {
         if !matches!(unit, 9102 | 9122) {
             let found = format!("EPSG unit {unit}");
             return Err(Error::argument("the unit of angles", found, "the degree")
-                .advise("reproject with `gdalwarp -t_srs EPSG:4326`"));
+                .advise(Remedy::ReprojectToLonLat));
         }
         let Some((datum, caveat)) = self.datum() else {
             return Err(Error::argument("the ellipsoid of the CRS", "missing", "given")
-                .advise("name the right CRS with `gdal_edit.py -a_srs EPSG:...`"));
+                .advise(Remedy::SetCrs));
         };
         let crs = Crs::from_proj(&format!("+proj=longlat {datum} +no_defs"), &self.crs_name())?;
         Ok(Crs { caveat: crs.caveat.or(caveat), ..crs })

@@ -2,7 +2,7 @@
 
 use super::crs::Crs;
 use super::wkt::{geographic_code, utm_code, wkt_authority, wkt_ellipsoid, wkt_name, wkt_unit};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 
 impl Crs {
     /// The CRS of well-known text, as in a `.prj` file: by its EPSG code, by a name that says one, or else by
@@ -28,8 +28,7 @@ impl Crs {
             _ => {
                 let found = "one without an EPSG code or a unit that is understood";
                 Err(Error::argument("the CRS description", found, "one with either").advise(
-                    "replace it by the WKT that `gdalsrsinfo -o wkt1 EPSG:...` prints, or remove it to have map \
-                     units taken as metres",
+                    Remedy::ReplaceWkt.after("remove it to have map units taken as metres, or "),
                 ))
             }
         }

@@ -3,23 +3,21 @@
 use std::path::Path;
 
 use super::format::Head;
-use crate::error::{Error, Result};
-
-const CONVERT: &str = "convert it with `gdal_translate IN OUT.tif`";
+use crate::error::{Error, Remedy, Result};
 
 /// The first bytes of a file, what it is, and what to do with it.
-const MAGIC: [(&[u8], &str, &str); 11] = [
-    (b"\x1f\x8b", "a gzip file", "unpack it with `gunzip`"),
-    (b"PK\x03\x04", "a zip archive", "unpack it first"),
-    (b"\x89PNG", "a picture (PNG), not read yet", CONVERT),
-    (b"\xff\xd8\xff", "a picture (JPEG), not read yet", CONVERT),
-    (b"P5", "a picture (PGM), not read yet", CONVERT),
-    (b"DSAA", "a Surfer grid, not read yet", CONVERT),
-    (b"DSBB", "a Surfer grid, not read yet", CONVERT),
-    (b"DSRB", "a Surfer grid, not read yet", CONVERT),
-    (b"\x89HDF", "an HDF5 or netCDF file, which is not read", CONVERT),
-    (b"CDF", "a netCDF file, which is not read", CONVERT),
-    (b"\x93NUMPY", "a NumPy array, not read yet", "write it as a GeoTIFF"),
+const MAGIC: [(&[u8], &str, Remedy); 11] = [
+    (b"\x1f\x8b", "a gzip file", Remedy::Unpack),
+    (b"PK\x03\x04", "a zip archive", Remedy::Unpack),
+    (b"\x89PNG", "a picture (PNG), not read yet", Remedy::Convert),
+    (b"\xff\xd8\xff", "a picture (JPEG), not read yet", Remedy::Convert),
+    (b"P5", "a picture (PGM), not read yet", Remedy::Convert),
+    (b"DSAA", "a Surfer grid, not read yet", Remedy::Convert),
+    (b"DSBB", "a Surfer grid, not read yet", Remedy::Convert),
+    (b"DSRB", "a Surfer grid, not read yet", Remedy::Convert),
+    (b"\x89HDF", "an HDF5 or netCDF file, which is not read", Remedy::Convert),
+    (b"CDF", "a netCDF file, which is not read", Remedy::Convert),
+    (b"\x93NUMPY", "a NumPy array, not read yet", Remedy::Convert),
 ];
 
 /// Extensions of DEMs that cannot be recognised by their content.
@@ -34,20 +32,20 @@ pub(super) fn refuse_failed_download(path: &Path, head: &Head) -> Result<()> {
     }
     if begins("version https://git-lfs") {
         let pointer = Error::argument("the file", "a Git LFS pointer", "the DEM itself");
-        return Err(pointer.advise("fetch it with `git lfs pull`").in_file(path));
+        return Err(pointer.advise(Remedy::FetchFromLfs).in_file(path));
     }
     Ok(())
 }
 
 /// Refuses files of formats that are known but not read.
 pub(super) fn refuse_known(path: &Path, head: &Head) -> Result<()> {
-    if let Some((_, found, advice)) = MAGIC.iter().find(|(magic, ..)| head.bytes.starts_with(magic))
+    if let Some((_, found, remedy)) = MAGIC.iter().find(|(magic, ..)| head.bytes.starts_with(magic))
     {
-        return Err(Error::unsupported(path, *found, *advice));
+        return Err(Error::unsupported(path, *found, *remedy));
     }
     if EXTENSIONS.contains(&head.extension.as_str()) {
         let found = format!("a .{} file, not read yet", head.extension);
-        return Err(Error::unsupported(path, found, CONVERT));
+        return Err(Error::unsupported(path, found, Remedy::Convert));
     }
     Ok(())
 }

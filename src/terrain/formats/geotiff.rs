@@ -13,6 +13,7 @@ use super::format::{Format, ReadMode};
 use super::tiff::{
     Directory, Layout, Sample, Tiff, TiffError, TiffResult, damaged, is_tiff, tag, unsupported,
 };
+use crate::error::Remedy;
 use crate::terrain::Source;
 use crate::terrain::crs::{Crs, GeoKeys, key, length_unit};
 use crate::terrain::raster::Raster;
@@ -120,10 +121,7 @@ fn refuse_pictures(image: &Directory, layout: &Layout) -> TiffResult<()> {
         (0 | 1, _) => Ok(()),
         // GDAL calls three floating-point bands RGB if told so, and they may well be a tensor.
         (2, sample) if sample.is_float() => Ok(()),
-        (2, _) => unsupported(
-            "an RGB picture, not heights",
-            "if one band holds heights, take it with `gdal_translate -b`",
-        ),
+        (2, _) => unsupported("an RGB picture, not heights", Remedy::TakeBand),
         (3, _) => unsupported(
             "a palette picture, whose numbers are indexes of colours, not heights",
             HEIGHTS,
@@ -170,10 +168,7 @@ impl Placement {
 }
 
 fn rotated<T>() -> TiffResult<T> {
-    unsupported(
-        "a grid that is rotated or sheared against the map",
-        "make it north-up with `gdalwarp -r bilinear IN OUT.tif`",
-    )
+    unsupported("a grid that is rotated or sheared against the map", Remedy::TurnNorthUp)
 }
 
 /// The place that the tags give, else a world file, else none: cells of 1 × 1 at the origin.
@@ -218,10 +213,9 @@ fn placement(image: &Directory, is_point: bool) -> TiffResult<Option<Placement>>
             let first = DVec2::splat(half) - DVec2::new(*i, *j);
             Placement::new(DVec2::new(*x, *y) + step * first, step).map(Some)
         }
-        ([], [_, _, _, _, _, _, _, ..]) => unsupported(
-            "a grid that is placed by ground control points",
-            "make it north-up with `gdalwarp -tps IN OUT.tif`",
-        ),
+        ([], [_, _, _, _, _, _, _, ..]) => {
+            unsupported("a grid that is placed by ground control points", Remedy::Rectify)
+        }
         _ => Ok(None),
     }
 }
@@ -274,7 +268,7 @@ fn void_nodata(
     if lowest < -12_000.0 || lowest == -9999.0 {
         notes.push(format!(
             "some cells hold {lowest}, which looks like a void that is not declared; \
-             declare it with `gdal_edit.py -a_nodata {lowest}`"
+             declare it as the nodata value of the file"
         ));
     }
 }
@@ -341,7 +335,7 @@ fn height_unit(keys: &GeoKeys, metadata: &str) -> TiffResult<Option<(&'static st
             Some(unit) => Ok(Some(unit)),
             None => unsupported(
                 format!("heights in the unit `{text}`, which is not known"),
-                "scale them to metres, for instance with `gdal_calc.py`",
+                Remedy::ScaleToMetres,
             ),
         };
     }
@@ -350,7 +344,7 @@ fn height_unit(keys: &GeoKeys, metadata: &str) -> TiffResult<Option<(&'static st
             Some(unit) => Ok(Some(unit)),
             None => unsupported(
                 format!("heights in the unit EPSG:{code}, which is not known"),
-                "scale them to metres, for instance with `gdal_calc.py`",
+                Remedy::ScaleToMetres,
             ),
         };
     }
@@ -494,7 +488,7 @@ mod tests {
         };
         let raster = placed(0.0, 10.0).read().unwrap();
         assert_eq!((raster.origin, raster.step), (DVec2::new(505.0, 905.0), DVec2::splat(10.0)));
-        assert!(placed(1.0, -10.0).refusal().contains("gdalwarp"));
+        assert!(placed(1.0, -10.0).refusal().contains("north-up"));
         assert!(placed(0.0, 0.0).refusal().contains("cell size"));
     }
 
@@ -563,7 +557,7 @@ mod tests {
         assert_eq!(terrain.frame().step(), DVec2::splat(5.0));
         assert_eq!(terrain.heights(), [1.0, 2.0, 3.0, 4.0]);
         fs::write(path.with_extension("tfw"), "5\n1\n1\n-5\n1002.5\n2002.5\n").unwrap();
-        assert!(crate::terrain::Terrain::open(&path).unwrap_err().to_string().contains("gdalwarp"));
+        assert!(crate::terrain::Terrain::open(&path).unwrap_err().to_string().contains("north-up"));
     }
 
     #[test]

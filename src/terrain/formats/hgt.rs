@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::DVec2;
 
 use super::format::{Format, Head, ReadMode};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::terrain::raster::Raster;
 use crate::terrain::{Crs, Source};
 
@@ -134,7 +134,7 @@ fn unzip(path: &Path, _: &[u8]) -> Result<Vec<u8>> {
 }
 
 fn unpack_first(path: &Path, found: &str) -> Error {
-    Error::unsupported(path, found, "unpack it first")
+    Error::unsupported(path, found, Remedy::Unpack)
 }
 
 /// Unpacks to the size of the largest tile and a byte more, whatever the archive claims.

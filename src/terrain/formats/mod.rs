@@ -82,12 +82,12 @@ mod tests {
         for (head, path, word) in [
             (&b""[..], "a.tif", "empty"),
             (b"<!DOCTYPE html><html>", "a.tif", "HTML"),
-            (b"version https://git-lfs.github.com/spec/v1", "a.tif", "git lfs pull"),
+            (b"version https://git-lfs.github.com/spec/v1", "a.tif", "Git LFS"),
             (b"\x89PNG\r\n", "a.png", "not read yet"),
             (b"\x89PNG\r\n", "a.asc", "not read yet"),
             (b"DSAA\n", "a.grd", "Surfer"),
             (b"PK\x03\x04", "a.zip", "unpack"),
-            (b"1.0 2.0 3.0", "a.xyz", "gdal_translate"),
+            (b"1.0 2.0 3.0", "a.xyz", "convert it"),
             (b"\0\0\0\0", "a.tif", "no known format"),
         ] {
             let message = of(head, path).unwrap_err().to_string();

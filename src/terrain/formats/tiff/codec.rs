@@ -3,6 +3,7 @@
 use std::io::Read;
 
 use super::error::{TiffResult, unsupported};
+use crate::error::Remedy;
 
 /// What is done to the bytes of a chunk before storing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,10 +32,7 @@ impl Codec {
             50002 => "JPEG XL",
             _ => "unknown",
         };
-        unsupported(
-            format!("compression {code}, {name}, which is not read"),
-            "convert with `gdal_translate -co COMPRESS=DEFLATE IN OUT.tif`",
-        )
+        unsupported(format!("compression {code}, {name}, which is not read"), Remedy::Recompress)
     }
 
     /// More bytes than this cannot come out of one byte: what a forged size is held against.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::Error;
+use crate::error::{Advice, Error};
 
 /// Why a TIFF cannot be read; the caller adds the path.
 #[derive(Debug)]
@@ -14,7 +14,7 @@ pub(crate) enum TiffError {
         /// What it holds.
         found: String,
         /// How to make one that is read.
-        advice: String,
+        advice: Advice,
     },
     /// The CRS is not one that is known.
     Crs(Error),
@@ -60,6 +60,6 @@ pub(crate) fn damaged<T>(
 }
 
 /// A [`TiffError::Unsupported`].
-pub(crate) fn unsupported<T>(found: impl Into<String>, advice: impl Into<String>) -> TiffResult<T> {
+pub(crate) fn unsupported<T>(found: impl Into<String>, advice: impl Into<Advice>) -> TiffResult<T> {
     Err(TiffError::Unsupported { found: found.into(), advice: advice.into() })
 }

@@ -9,7 +9,7 @@ use super::error::{TiffError, TiffResult, damaged, unsupported};
 use super::predictor::Predictor;
 use super::sample::Sample;
 use super::tag;
-use crate::error::Error;
+use crate::error::{Error, Remedy};
 
 /// How the samples of one image are laid out in the file.
 pub(crate) struct Layout<'a> {
@@ -54,7 +54,7 @@ impl<'a> Layout<'a> {
         if matches!(sample, Sample::Packed(_)) && image.uint(tag::FILL_ORDER, 1)? == 2 {
             return unsupported(
                 "packed samples in FillOrder 2, which are not read",
-                "convert with `gdal_translate IN OUT.tif`",
+                Remedy::Convert,
             );
         }
         let layout = Self {
@@ -244,7 +244,7 @@ fn common_value(image: &Directory, tag: u16) -> TiffResult<u64> {
     if values.iter().any(|v| *v != values[0]) {
         return unsupported(
             "bands of different sample types, which are not read",
-            "pick one with `gdal_translate -b`",
+            Remedy::TakeBand,
         );
     }
     Ok(values.first().copied().unwrap_or(1))

@@ -2,6 +2,7 @@
 
 use super::error::{TiffResult, damaged, unsupported};
 use super::sample::Sample;
+use crate::error::Remedy;
 
 /// What was done to the samples of a row before they were compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,10 +21,7 @@ impl Predictor {
             (2, _) => Ok(Self::Differences),
             (3, _) if sample.is_float() => Ok(Self::FloatingPoint),
             (3, _) => damaged(format!("the predictor of {} samples", sample.name()), 3, "1 or 2"),
-            _ => unsupported(
-                format!("predictor {code}, which is not known"),
-                "convert with `gdal_translate -co PREDICTOR=1 IN OUT.tif`",
-            ),
+            _ => unsupported(format!("predictor {code}, which is not known"), Remedy::Recompress),
         }
     }
 

@@ -3,8 +3,7 @@
 use half::f16;
 
 use super::error::{TiffResult, damaged, unsupported};
-
-const CONVERT: &str = "convert with `gdal_translate -ot Float32 IN OUT.tif`";
+use crate::error::Remedy;
 
 /// How one sample is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,12 +40,15 @@ impl Sample {
             (3, 32) => Self::F32,
             (3, 64) => Self::F64,
             (5 | 6, _) => {
-                return unsupported("the samples are complex numbers, not heights", CONVERT);
+                return unsupported(
+                    "the samples are complex numbers, not heights",
+                    Remedy::ConvertSamples,
+                );
             }
             _ => {
                 let found =
                     format!("samples of {bits} bits in sample format {format}, which are not read");
-                return unsupported(found, CONVERT);
+                return unsupported(found, Remedy::ConvertSamples);
             }
         })
     }
