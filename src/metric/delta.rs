@@ -8,7 +8,7 @@ use crate::surface::{Measures, Surface};
 pub(crate) const PLANE_BEND: f64 = 1e-3;
 
 /// The offset `δ` of the curvature tensor, 1/m. A step along a principal direction costs `√(δ + |κ|)` per metre, so the smaller `δ`
-/// is, the cheaper are flat directions beside curved ones.
+/// is, the cheaper are flat directions compared with curved ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Delta {
     /// This share of the root-mean-square curvature of the surface. Scaling a terrain then scales `D` by a

@@ -199,34 +199,10 @@ mod tests {
 
     use super::*;
     use crate::metric::{Curvature, Delta, Difference, Isotropic, Tensor};
-    use crate::surface::{FitOptions, HeightSurface, Measures};
+    use crate::surface::in_space::InSpace;
+    use crate::surface::{FitOptions, HeightSurface};
     use crate::synthetic::{Synthetic, SyntheticKind};
     use crate::terrain::{Crs, Terrain};
-
-    /// Heights as a surface in space.
-    struct InSpace<'a>(&'a HeightSurface);
-
-    impl Surface for InSpace<'_> {
-        fn cols(&self) -> usize {
-            self.0.cols()
-        }
-
-        fn rows(&self) -> usize {
-            self.0.rows()
-        }
-
-        fn jet(&self, at: DVec2) -> Jet {
-            Jet::Space(self.0.space_jet(at))
-        }
-
-        fn is_void(&self, col: usize, row: usize) -> bool {
-            self.0.is_void(col, row)
-        }
-
-        fn measures(&self) -> Measures {
-            self.0.measures()
-        }
-    }
 
     fn surfaces() -> impl Iterator<Item = HeightSurface> {
         [SyntheticKind::Fractal, SyntheticKind::Sphere].into_iter().map(|kind| {
@@ -256,7 +232,7 @@ mod tests {
         };
         let metrics: [&dyn Metric; 3] = [&Isotropic, &Curvature::default(), &Difference::default()];
         for surface in surfaces() {
-            let space = InSpace(&surface);
+            let space = InSpace::measured_on_the_map(&surface);
             for (metric, modifiers) in
                 metrics.into_iter().flat_map(|metric| [(metric, &plain), (metric, &weighed)])
             {
@@ -297,7 +273,7 @@ mod tests {
             (0..1200).map(|i| Sym2::new(2.0 + f64::from(i).sin(), 0.5, 1.0)).collect();
         let (none, control) = (Modifiers::default(), Control::default());
         for surface in surfaces() {
-            let space = InSpace(&surface);
+            let space = InSpace::measured_on_the_map(&surface);
             let metric = Tensor { tensors: tensors.clone() };
             let d = metric.on(&space, &none, &control).unwrap().speed(DVec2::new(3.5, 4.0));
             let mean = 0.5 * (tensors[163].xx + tensors[164].xx);

@@ -59,7 +59,7 @@
 //!
 //! # Adding a metric to this crate
 //!
-//! It is a file of its own beside `isotropic.rs` that holds its [`NamedMetric`], and an entry in [`NAMED`], from which the command
+//! It is a file of its own next to `isotropic.rs` that holds its [`NamedMetric`], and an entry in [`NAMED`], from which the command
 //! and its help are made.
 
 mod block;
