@@ -1,4 +1,4 @@
-"""Runs ridgeway's solver beside the eikonal solvers that Python users install, and prints Markdown tables.
+"""Runs ridgeway's solver and the eikonal solvers that Python users install, and prints Markdown tables.
 
     python3 -m venv /tmp/peers
     /tmp/peers/bin/pip install numpy scikit-fmm eikonalfm scikit-image fim-python

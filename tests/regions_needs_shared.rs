@@ -8,7 +8,7 @@ use ridgeway::{
     Control, Curvature, FitOptions, HeightJet, HeightSurface, Isotropic, Metric, Modifiers, Terrain,
 };
 
-/// Mean over the nodes beside another region, and over the others, of the larger `|κ|`, 1/m.
+/// Mean over the nodes next to another region, and over the others, of the larger `|κ|`, 1/m.
 fn mean_curvatures(surface: &HeightSurface, cut: &Segmentation) -> [f64; 2] {
     let (cols, labels) = (cut.cols, &cut.levels[0].labels);
     let mut sums = [(0.0, 0usize); 2];

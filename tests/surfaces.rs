@@ -3,6 +3,8 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use glam::{DVec2, DVec3, DVec4};
+use proptest::prelude::*;
+use ridgeway::eikonal::TensorField;
 use ridgeway::route::trace;
 use ridgeway::{
     Accuracy, Control, Curvature, Delta, DistanceMap, Isotropic, Knots, Metric, MetricField,
@@ -79,7 +81,7 @@ fn sphere_errors(sphere: &NurbsSurface, start: DVec2, accuracy: Accuracy, n: usi
 
 #[test]
 fn great_circles_on_a_sphere_through_its_poles() {
-    let starts = [("pole", 0.0), ("beside the pole", 0.05), ("middle", 0.37), ("equator", 0.5)];
+    let starts = [("pole", 0.0), ("next to the pole", 0.05), ("middle", 0.37), ("equator", 0.5)];
     for (name, row) in starts {
         for (accuracy, least, most) in
             [(Accuracy::Fast, [0.9, 0.65], 1e-3), (Accuracy::High, [1.2, 0.5], 6e-5)]
@@ -194,7 +196,7 @@ fn routes_are_great_circles_across_seams_and_poles() {
     let metric = Isotropic.on(&surface, &Modifiers::default(), &Control::default()).unwrap();
     let start = DVec2::new(150.0, 20.0);
     let map = solve(&metric, start, Accuracy::Fast);
-    // Over the seam, beside the pole, and almost exactly over it.
+    // Over the seam, next to the pole, and almost exactly over it.
     for goal in [
         DVec2::new(20.0, 30.0),
         DVec2::new(60.0, 14.0),
@@ -233,4 +235,57 @@ fn threads_change_no_bit() {
         })
     };
     assert!(of(1) == of(2) && of(1) == of(4));
+}
+
+/// Parameters all over the domain of a surface.
+fn parameters(surface: &NurbsSurface) -> impl Iterator<Item = DVec2> + '_ {
+    let [[left, right], [bottom, top]] = surface.knots().each_ref().map(Knots::domain);
+    let (first, size) = (DVec2::new(left, bottom), DVec2::new(right - left, top - bottom));
+    (0..63).map(move |k| {
+        let share = DVec2::new((f64::from(k % 9) + 0.4) / 9.0, (f64::from(k / 9) + 0.3) / 7.0);
+        first + share * size
+    })
+}
+
+/// Degree and knots, right or wrong.
+fn any_knots() -> impl Strategy<Value = (usize, Vec<f64>)> {
+    let step = prop_oneof![4 => Just(0.0), 4 => Just(1.0), 1 => -0.5..3.0, 1 => Just(f64::NAN)];
+    (0..5_usize, prop::collection::vec(step, 0..14)).prop_map(|(degree, steps)| {
+        let ascend = steps.iter().scan(0.0, |u, step| {
+            *u += step;
+            Some(*u)
+        });
+        (degree, ascend.collect())
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// Whatever is accepted can be evaluated everywhere, is itself again by way of a file, and bears a metric.
+    #[test]
+    fn nonsense_is_refused_and_the_rest_is_finite(
+        knots in [any_knots(), any_knots()],
+        closed in any::<[bool; 2]>(),
+        flat in any::<bool>(),
+        points in prop::collection::vec([-1.0..1.0, -1.0..1.0, -1.0..1.0, 0.1..2.0f64], 144),
+    ) {
+        let [Ok(first), Ok(second)] = knots.map(|(degree, knots)| Knots::new(degree, knots)) else {
+            return Ok(());
+        };
+        let count = first.controls() * second.controls();
+        let points: Vec<DVec4> = points.into_iter().cycle().take(count).map(DVec4::from).map(|p| if flat { p.with_z(0.0) } else { p }).collect();
+        let Ok(surface) = NurbsSurface::new([first, second], closed, &points) else { return Ok(()) };
+        for u in parameters(&surface).chain([DVec2::splat(-1e9), DVec2::splat(1e9)]) {
+            let jet = surface.jet(u);
+            let all = jet.first.iter().chain(&jet.second).chain([&jet.point]);
+            prop_assert!(all.into_iter().all(|v| v.is_finite()));
+        }
+        let again = NurbsSurface::from_json(&surface.to_json()).unwrap();
+        prop_assert!(again.jet(DVec2::ONE).point.distance(surface.jet(DVec2::ONE).point) < 1e-12);
+        let grid = surface.on_grid(5, 4).unwrap();
+        let (none, control) = (Modifiers::default(), Control::default());
+        let metric = Curvature::default().on(&grid, &none, &control).unwrap();
+        TensorField::sample(&metric, &control).unwrap();
+    }
 }

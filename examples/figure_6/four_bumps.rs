@@ -101,7 +101,7 @@ pub(crate) fn total_curvature_watershed(gaussian: &[f64]) -> usize {
     let mut home = vec![usize::MAX; gaussian.len()];
     let mut extremes = 0;
     for node in order {
-        let mut basins: Vec<usize> = beside(node)
+        let mut basins: Vec<usize> = neighbours(node)
             .filter(|&other| home[other] != usize::MAX)
             .map(|mut at| {
                 while home[at] != at {
@@ -138,14 +138,14 @@ pub(crate) fn marching_between_walls(larger_curvature: &[f64]) -> usize {
         while let Some(node) = front.pop() {
             reached[node] = true;
             let same = |&other: &usize| !reached[other] && is_wall(other) == is_wall(node);
-            front.extend(beside(node).filter(same));
+            front.extend(neighbours(node).filter(same));
         }
     }
     regions
 }
 
 /// The eight nodes around one.
-fn beside(node: usize) -> impl Iterator<Item = usize> {
+fn neighbours(node: usize) -> impl Iterator<Item = usize> {
     let (col, row) = (node % SIDE, node / SIDE);
     let within = move |at: usize, by: usize| (at + by).checked_sub(1).filter(|&at| at < SIDE);
     (0..9).filter_map(move |i| {

@@ -178,11 +178,11 @@ pub(crate) fn separation(points: &[Point]) -> [f64; 2] {
         let nearest = others().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         sums[0] += f64::from(u8::from(nearest.is_some_and(|q| q.part == point.part)));
         let within = mean(point.part);
-        let beside = others()
+        let nearest_other = others()
             .filter(|q| q.part != point.part)
             .map(|q| mean(q.part))
             .fold(f64::INFINITY, f64::min);
-        sums[1] += (beside - within) / beside.max(within);
+        sums[1] += (nearest_other - within) / nearest_other.max(within);
     }
     sums.map(|sum| sum / points.len() as f64)
 }

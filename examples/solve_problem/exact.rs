@@ -80,7 +80,8 @@ impl Horizon {
     /// With a margin of half a percent for the finite number of directions.
     fn sees(&self, image: DVec2) -> bool {
         let at = Self::direction(image);
-        let beside = [at + Self::DIRECTIONS - 1, at, at + 1].map(|k| self.0[k % Self::DIRECTIONS]);
-        image.length() < 0.995 * beside.into_iter().fold(f64::INFINITY, f64::min)
+        let neighbours =
+            [at + Self::DIRECTIONS - 1, at, at + 1].map(|k| self.0[k % Self::DIRECTIONS]);
+        image.length() < 0.995 * neighbours.into_iter().fold(f64::INFINITY, f64::min)
     }
 }

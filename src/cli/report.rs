@@ -76,17 +76,20 @@ impl Table {
     pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         self.0.push(cells.into_iter().map(Into::into).collect());
     }
+
+    /// Characters of the widest cell of a column.
+    fn width(&self, column: usize) -> usize {
+        let cells = self.0.iter().filter_map(|row| row.get(column));
+        cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+    }
 }
 
 impl std::fmt::Display for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let width = |column: usize| {
-            self.0.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max()
-        };
         for row in &self.0 {
             let mut line = String::new();
             for (column, cell) in row.iter().enumerate() {
-                let width = width(column).unwrap_or(0);
+                let width = self.width(column);
                 match column {
                     0 => line += &format!("{cell:<width$}"),
                     _ => line += &format!("  {cell:>width$}"),

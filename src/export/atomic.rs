@@ -88,7 +88,7 @@ fn write_and_rename(
         .map_err(|e| e.error)
 }
 
-/// Fills the folder `path` by `fill`, which is given an empty temporary folder: beside it, and renamed into
+/// Fills the folder `path` by `fill`, which is given an empty temporary folder: next to it, and renamed into
 /// place when `fill` has succeeded; or, if a folder is already there, inside it (its parent may be closed to
 /// us or on another disk), whose files are then moved up, and files of other names stay as they are.
 ///

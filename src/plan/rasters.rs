@@ -46,11 +46,13 @@ fn check_grid(path: &Path, theirs: &GridFrame, ours: &GridFrame) -> Result<()> {
     {
         return Ok(());
     }
-    let grid = |frame: &GridFrame| {
-        let (cols, rows, origin) = (frame.cols(), frame.rows(), frame.origin());
-        format!("{cols} x {rows} cells from {},{}", origin.x, origin.y)
-    };
-    Err(Error::argument("the grid", grid(theirs), format!("that of the DEM, {}", grid(ours)))
+    let expected = format!("that of the DEM, {}", described(ours));
+    Err(Error::argument("the grid", described(theirs), expected)
         .advise(Remedy::ResampleToDem)
         .in_file(path))
+}
+
+fn described(frame: &GridFrame) -> String {
+    let (cols, rows, origin) = (frame.cols(), frame.rows(), frame.origin());
+    format!("{cols} x {rows} cells from {},{}", origin.x, origin.y)
 }

@@ -36,7 +36,7 @@ impl MetricField<'_> {
 /// index in the row-major grid with its distance; none if the seed is closed.
 ///
 /// # Cost
-/// That of the tiles of 16 × 16 nodes that hold the cluster; what lies beyond those beside them is not looked at. Besides, 4 bytes per node of
+/// That of the tiles of 16 × 16 nodes that hold the cluster; what lies beyond those next to them is not looked at. Besides, 4 bytes per node of
 /// the grid are set aside, which takes at most 0.2 ms per million nodes.
 ///
 /// # Errors

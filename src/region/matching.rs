@@ -21,7 +21,7 @@ pub struct Match {
 }
 
 /// Matches regions of two surfaces: the two most alike first, then the two most alike of the others, until one surface
-/// has none left. With `sized`, size counts beside shape. Regions in which nothing varies, such as those of one node, are left out.
+/// has none left. With `sized`, size counts as well as shape. Regions in which nothing varies, such as those of one node, are left out.
 ///
 /// # Cost
 /// Some 50 ns and 24 bytes for each pair.
@@ -62,14 +62,11 @@ fn greedy(
         )
         .advise("segment more coarsely"));
     }
-    let dissimilarity = |i: usize, j: usize| {
-        let (a, b) = (&first[i], &second[j]);
-        if sized { a.sized_distance(b) } else { a.distance(b) }
-    };
+    let distance = if sized { Signature::sized_distance } else { Signature::distance };
     // In a region of one node, or of none, nothing varies: it is like none.
     let varies = |signature: &Signature| signature.eigenvalues[0] > 0.0;
     let pairs = pairs.filter(|&(i, j)| varies(&first[i]) && varies(&second[j]));
-    let mut pairs: Vec<_> = pairs.map(|(i, j)| (dissimilarity(i, j), i, j)).collect();
+    let mut pairs: Vec<_> = pairs.map(|(i, j)| (distance(&first[i], &second[j]), i, j)).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let mut states = vec![State::default(); first.len() + second.len()];
     let mut found = Vec::new();

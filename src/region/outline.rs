@@ -43,7 +43,7 @@ impl Cells<'_> {
         if inside { self.labels[(row - 1) * self.cols + col - 1] } else { None }
     }
 
-    /// Adds the sides of a cell beside other labels, from corner to corner, the cell on the left.
+    /// Adds the sides of a cell along other labels, from corner to corner, the cell on the left.
     fn add_sides(&self, col: usize, row: usize, sides: &mut Vec<[usize; 2]>) {
         let own = self.label(col + 1, row + 1);
         let north_west = row * (self.cols + 1) + col;
@@ -61,7 +61,7 @@ impl Cells<'_> {
         }
     }
 
-    /// A ring of corners without those where it runs straight on and only one other label lies beside it, as grid
+    /// A ring of corners without those where it runs straight on and only one other label lies along it, as grid
     /// coordinates.
     fn corners(&self, ring: &[usize]) -> LineString<f64> {
         let count = ring.len();
@@ -71,13 +71,15 @@ impl Cells<'_> {
             let straight = after.wrapping_sub(here) == here.wrapping_sub(before);
             !straight || self.labels_around(here) > 2
         });
-        let coordinates = |i: usize| {
-            let (col, row) = (ring[i] % (self.cols + 1), ring[i] / (self.cols + 1));
-            Coord { x: col as f64 - 0.5, y: row as f64 - 0.5 }
-        };
-        let mut corners: LineString<f64> = kept.map(coordinates).collect();
+        let mut corners: LineString<f64> = kept.map(|i| self.coordinates(ring[i])).collect();
         corners.close();
         corners
+    }
+
+    /// Grid coordinates of a corner.
+    fn coordinates(&self, corner: usize) -> Coord<f64> {
+        let (col, row) = (corner % (self.cols + 1), corner / (self.cols + 1));
+        Coord { x: col as f64 - 0.5, y: row as f64 - 0.5 }
     }
 
     fn labels_around(&self, corner: usize) -> usize {
@@ -129,7 +131,7 @@ fn polygons(rings: impl Iterator<Item = LineString<f64>>) -> MultiPolygon<f64> {
     let mut polygons: Vec<_> =
         exteriors.into_iter().map(|exterior| Polygon::new(exterior, Vec::new())).collect();
     for hole in holes {
-        let cell = cell_beside(&hole);
+        let cell = cell_left_of(&hole);
         if let Some(owner) = polygons.iter_mut().find(|polygon| contains(polygon, cell)) {
             owner.interiors_push(hole);
         }
@@ -138,7 +140,7 @@ fn polygons(rings: impl Iterator<Item = LineString<f64>>) -> MultiPolygon<f64> {
 }
 
 /// The middle of the cell on the left of the first side of a ring.
-fn cell_beside(ring: &LineString<f64>) -> DVec2 {
+fn cell_left_of(ring: &LineString<f64>) -> DVec2 {
     let [from, to] = [ring[0], ring[1]].map(|end| DVec2::new(end.x, end.y));
     let along = (to - from).normalize_or_zero();
     from + 0.5 * (along - along.perp())

@@ -196,15 +196,22 @@ fn fill(labels: &mut [Option<u32>], inside: &[bool], cols: usize) {
     while unlabelled.len() < before {
         before = unlabelled.len();
         unlabelled.retain(|&i| {
-            let beside = |&(x, y): &(isize, isize)| {
-                let col = (i % cols).checked_add_signed(x).filter(|&col| col < cols)?;
-                let row = (i / cols).checked_add_signed(y)?;
-                *labels.get(row * cols + col)?
-            };
-            labels[i] = RING.iter().find_map(beside);
+            labels[i] = RING.iter().find_map(|&step| neighbour_label(labels, cols, i, step));
             labels[i].is_none()
         });
     }
+}
+
+/// The label of the node a step from node `i`, if there is one.
+fn neighbour_label(
+    labels: &[Option<u32>],
+    cols: usize,
+    i: usize,
+    (x, y): (isize, isize),
+) -> Option<u32> {
+    let col = (i % cols).checked_add_signed(x).filter(|&col| col < cols)?;
+    let row = (i / cols).checked_add_signed(y)?;
+    *labels.get(row * cols + col)?
 }
 
 /// The columns and rows that hold all nodes of these ascending indices in a row-major grid with `cols` columns.
@@ -212,11 +219,9 @@ fn spans(indices: &[usize], cols: usize) -> [Range<usize>; 2] {
     let [Some(&first), Some(&last)] = [indices.first(), indices.last()] else {
         return [0..0, 0..0];
     };
-    let widen = |span: Range<usize>, &index: &usize| {
-        let col = index % cols;
-        span.start.min(col)..span.end.max(col + 1)
-    };
-    [indices.iter().fold(cols..0, widen), first / cols..last / cols + 1]
+    let west = indices.iter().map(|index| index % cols).min().unwrap_or(0);
+    let east = indices.iter().map(|index| index % cols).max().unwrap_or(0);
+    [west..east + 1, first / cols..last / cols + 1]
 }
 
 /// A part of a grid.
@@ -313,7 +318,7 @@ mod tests {
             let solver = Solver::default();
             solver.solve_field(field.clone(), starts, &Stop::Never, &Control::default()).unwrap()
         };
-        // With other factors taken out, values differ by their errors of first order.
+        // With other source factors, values differ by their errors of first order.
         let farthest = distance(&starts).to_row_major().into_iter().fold(0f32, f32::max);
         assert!(f64::from(farthest) < 1.05 * radius, "{farthest}");
         // No seed is in the cluster of an earlier one.

@@ -36,6 +36,15 @@ impl Label {
     fn is_apart(&self, middle: Vec2, half: Vec2) -> bool {
         (middle - self.middle).abs().cmpgt(self.half + half).any()
     }
+
+    /// Whether it is on the map, away from `taken` points and from labels that are drawn.
+    fn is_free(&self, layout: &MapLayout, taken: &[Vec2], drawn: &[Self]) -> bool {
+        let reach = Vec2::splat(10.0 * layout.unit);
+        layout.shows(self.middle - self.half)
+            && layout.shows(self.middle + self.half)
+            && taken.iter().all(|&point| self.is_apart(point, reach))
+            && drawn.iter().all(|other| self.is_apart(other.middle, other.half))
+    }
 }
 
 /// Thin lines, every fifth thicker; and where along each thick one its label may go, best first.
@@ -73,14 +82,8 @@ pub(super) fn draw_labels(layout: &mut MapLayout, labels: Vec<Vec<Label>>, taken
     let size = LABEL * layout.unit;
     let mut drawn: Vec<Label> = Vec::new();
     for places in labels {
-        let reach = Vec2::splat(10.0 * layout.unit);
-        let is_free = |label: &Label| {
-            layout.shows(label.middle - label.half)
-                && layout.shows(label.middle + label.half)
-                && taken.iter().all(|&point| label.is_apart(point, reach))
-                && drawn.iter().all(|other| label.is_apart(other.middle, other.half))
-        };
-        if let Some(label) = places.into_iter().find(is_free) {
+        let free = places.into_iter().find(|label| label.is_free(layout, taken, &drawn));
+        if let Some(label) = free {
             let width = text::width(&label.text, size);
             let baseline = label.middle + Vec2::new(-width / 2.0, 0.36 * size);
             layout.canvas.text(&label.text, size, baseline, label.colour, 3.0 * layout.unit);

@@ -161,14 +161,18 @@ fn shown_powers([low, high]: [i32; 2]) -> impl Iterator<Item = i32> {
 
 /// `10⁻³`.
 fn power_of_ten(power: i32) -> String {
-    let raised = |c: char| match c {
+    "10".chars().chain(power.to_string().chars().map(superscript)).collect()
+}
+
+/// A digit or a minus sign raised.
+fn superscript(c: char) -> char {
+    match c {
         '-' => '⁻',
         '1' => '¹',
         '2' => '²',
         '3' => '³',
         digit => char::from_u32('⁰' as u32 + digit as u32 - '0' as u32).unwrap_or(digit),
-    };
-    "10".chars().chain(power.to_string().chars().map(raised)).collect()
+    }
 }
 
 /// A disc, or a polygon with as many corners more as the kind says.
@@ -179,14 +183,12 @@ fn draw_mark(canvas: &mut Canvas, at: Vec2, kind: usize, colour: Rgb) {
     }
     // Square, diamond, triangle up, triangle down.
     let (corners, turn) = [(4, 0.125), (4, 0.0), (3, 0.75), (3, 0.25)][(kind - 1) % 4];
-    let corner = |radius: f32| {
-        move |i: usize| {
+    for (radius, colour) in [(MARK + 5.5, Rgb::WHITE), (MARK + 3.0, colour)] {
+        let polygon = (0..corners).map(|i| {
             let angle = std::f32::consts::TAU * (turn + i as f32 / corners as f32);
             at + radius * Vec2::from_angle(angle)
-        }
-    };
-    for (radius, colour) in [(MARK + 5.5, Rgb::WHITE), (MARK + 3.0, colour)] {
-        canvas.polygon(&(0..corners).map(corner(radius)).collect::<Vec<_>>(), colour);
+        });
+        canvas.polygon(&polygon.collect::<Vec<_>>(), colour);
     }
 }
 

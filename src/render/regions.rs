@@ -60,14 +60,15 @@ impl RegionLayer<'_> {
         let reach = SEED.iter().sum::<f32>() * layout.unit;
         for &seed in &self.seeds {
             let at = layout.to_pixels(seed) - Vec2::new(left as f32, top as f32);
-            let span = |at: f32, end: usize| {
-                (at - reach).max(0.0) as usize..end.min((at + reach) as usize + 1)
-            };
-            for y in span(at.y, height) {
-                let columns = span(at.x, width);
-                pixels[y * width..][columns].fill(None);
+            for y in pixels_around(at.y, reach, height) {
+                pixels[y * width..][pixels_around(at.x, reach, width)].fill(None);
             }
         }
         draw_numbers(&mut layout.canvas, &pixels, [left, top, width], NUMBER * layout.unit);
     }
+}
+
+/// The pixels of a row or column of `count` that lie within `reach` of a position.
+fn pixels_around(at: f32, reach: f32, count: usize) -> std::ops::Range<usize> {
+    (at - reach).max(0.0) as usize..count.min((at + reach) as usize + 1)
 }

@@ -126,20 +126,23 @@ fn block_means(frame: &GridFrame, heights: &[f64], block: usize) -> Vec<f64> {
 /// along an axis where there is none.
 fn gradient(heights: &[f64], cols: usize, rows: usize, i: usize, spacing: DVec2) -> DVec2 {
     let (col, row) = (i % cols, i / cols);
-    let known = |there: bool, j: usize| (there && heights[j].is_finite()).then_some(j);
-    let slope = |back: Option<usize>, ahead: Option<usize>, step: f64| {
-        let steps = usize::from(back.is_some()) + usize::from(ahead.is_some());
-        let rise = heights[ahead.unwrap_or(i)] - heights[back.unwrap_or(i)];
-        if steps == 0 { 0.0 } else { rise / (steps as f64 * step) }
-    };
-    if !heights[i].is_finite() {
+    let here = heights[i];
+    if !here.is_finite() {
         return DVec2::ZERO;
     }
+    let known = |there: bool, j: usize| there.then(|| heights[j]).filter(|h| h.is_finite());
     let west = known(col > 0, i.wrapping_sub(1));
     let east = known(col + 1 < cols, i + 1);
     let north = known(row > 0, i.wrapping_sub(cols));
     let south = known(row + 1 < rows, i + cols);
-    DVec2::new(slope(west, east, spacing.x), slope(south, north, spacing.y))
+    DVec2::new(slope([west, east], here, spacing.x), slope([south, north], here, spacing.y))
+}
+
+/// Rise per metre between the known heights a step back and a step ahead, or from one of them to that between; 0 if none is known.
+fn slope([back, ahead]: [Option<f64>; 2], here: f64, step: f64) -> f64 {
+    let steps = usize::from(back.is_some()) + usize::from(ahead.is_some());
+    let rise = ahead.unwrap_or(here) - back.unwrap_or(here);
+    if steps == 0 { 0.0 } else { rise / (steps as f64 * step) }
 }
 
 /// Light that ground of slope `gradient` returns, 1 where level (Lambert's law).

@@ -2,7 +2,7 @@
 //!
 //! Away from walls the line follows the solver's own directions, interpolated between the nodes, with the midpoint
 //! rule; the deviation from the exact line is set by the error of the distance, not by the step. Where that does
-//! not descend, beside walls and on the cut locus, it goes through the cell's border to the best point there,
+//! not descend, next to walls and on the cut locus, it goes through the cell's border to the best point there,
 //! by the same update as the solver; and where even that does not descend, from node to node, each to the point
 //! that gave it its value, which cannot fail.
 

@@ -78,12 +78,14 @@ fn shortest(
         )
         .at(Location::Grid(goal)));
     }
-    let inside = |at| field.tiling.contains(at);
-    let clear = |a, b| {
-        inside(a) && inside(b) && (is_open_around(field, a, b) || has_line_of_sight(field, a, b))
-    };
     let line = descent::line(distance, goal);
-    Ok(line.map(|line| polish::polish(&line, metric, &clear)))
+    Ok(line.map(|line| polish::polish(&line, metric, &|a, b| is_clear(field, a, b))))
+}
+
+/// Whether one may go straight from one point to another nearby.
+fn is_clear(field: &TensorField, a: DVec2, b: DVec2) -> bool {
+    let is_inside = field.tiling.contains(a) && field.tiling.contains(b);
+    is_inside && (is_open_around(field, a, b) || has_line_of_sight(field, a, b))
 }
 
 /// Whether all cells between two points nearby have open corners: then nothing can be in the way.

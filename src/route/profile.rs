@@ -12,7 +12,7 @@ use crate::surface::{Jet, Surface};
 pub struct Summary {
     /// Name of the metric.
     pub metric: String,
-    /// Parameters of the metric; in JSON members beside the others.
+    /// Parameters of the metric; in JSON members like the others.
     #[serde(flatten, serialize_with = "members")]
     pub parameters: Vec<Parameter>,
     /// Length of the line under the route's own metric.
@@ -158,9 +158,6 @@ const SEGMENT_CELLS: f64 = 0.5;
 impl Summary {
     pub(super) fn measure(line: &[DVec2], metric: &MetricField<'_>) -> Self {
         let surface = metric.surface();
-        let map = |at: Option<&DVec2>| {
-            at.map_or([f64::NAN; 2], |&at| surface.point(at).truncate().into())
-        };
         let mut summary = Self {
             metric: metric.name().to_owned(),
             parameters: metric.parameters().to_vec(),
@@ -174,8 +171,8 @@ impl Summary {
             mean_grade_percent: 0.0,
             max_side_slope_deg: 0.0,
             total_normal_curvature_rad: 0.0,
-            start: map(line.first()),
-            goal: map(line.last()),
+            start: map_coordinates(surface, line.first()),
+            goal: map_coordinates(surface, line.last()),
             software: concat!("ridgeway ", env!("CARGO_PKG_VERSION")).to_owned(),
         };
         for (from, to) in segments(line, SEGMENT_CELLS) {
@@ -196,6 +193,11 @@ impl Summary {
         }
         summary
     }
+}
+
+/// Map coordinates of the end of a line; not a number if the line has no points.
+fn map_coordinates(surface: &dyn Surface, end: Option<&DVec2>) -> [f64; 2] {
+    end.map_or([f64::NAN; 2], |&at| surface.point(at).truncate().into())
 }
 
 impl Route {

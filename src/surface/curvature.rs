@@ -19,7 +19,7 @@ pub struct PrincipalCurvatures {
     pub mean: f64,
     /// Principal curvatures `κ1 ≥ κ2`, 1/m.
     pub principal: [f64; 2],
-    /// Principal directions `w1, w2` in ground axes, `w_iᵀ G w_j = δ_ij`: plan views of orthogonal unit
+    /// Principal directions `w1, w2` in ground axes, `w_iᵀ G w_j = δ_ij`: projections onto the map of orthogonal unit
     /// tangents. Their signs are arbitrary, and at an umbilic so is the pair.
     pub directions: [DVec2; 2],
 }
@@ -44,7 +44,7 @@ impl HeightJet {
         DVec3::new(-self.zx, -self.zy, 1.0) / self.area_factor()
     }
 
-    /// First fundamental form `G = I + ∇z ∇zᵀ`: `√(vᵀGv)` is the length on the surface of a plan vector `v`.
+    /// First fundamental form `G = I + ∇z ∇zᵀ`: `√(vᵀGv)` is the length on the surface of a vector `v` on the map.
     #[must_use]
     pub fn first_form(&self) -> Sym2 {
         Sym2::new(1.0 + self.zx * self.zx, self.zx * self.zy, 1.0 + self.zy * self.zy)
@@ -57,7 +57,7 @@ impl HeightJet {
         Sym2::new(xx, xy, yy)
     }
 
-    /// Curvature `vᵀBv / vᵀGv`, 1/m, of the normal section along the plan direction `v`, whatever its length.
+    /// Curvature `vᵀBv / vᵀGv`, 1/m, of the normal section over the direction `v` on the map, whatever its length.
     #[must_use]
     pub fn normal_curvature(&self, v: DVec2) -> f64 {
         self.second_form().form(v) / self.first_form().form(v)
@@ -101,7 +101,7 @@ impl HeightJet {
         (trace * trace - 2.0 * hessian * area) / (area * area * area)
     }
 
-    /// Surface area per plan area, `√(1+|∇z|²)`.
+    /// Surface area per area on the map, `√(1+|∇z|²)`.
     #[inline(always)]
     fn area_factor(&self) -> f64 {
         (1.0 + self.gradient().length_squared()).sqrt()
@@ -113,7 +113,7 @@ impl HeightJet {
 pub(super) struct BlockSums<'a> {
     pub(super) jets: &'a HeightBlock,
     /// The area of the map, m², that each node stands for; 0 if it does not count.
-    pub(super) plan: &'a [Lanes; BLOCK],
+    pub(super) map_areas: &'a [Lanes; BLOCK],
 }
 
 impl Kernel for BlockSums<'_> {
@@ -122,12 +122,12 @@ impl Kernel for BlockSums<'_> {
     #[inline(always)]
     fn run(self) -> [f64; 2] {
         let (mut squares, mut areas) = ([0.0; BLOCK], [0.0; BLOCK]);
-        for (row, plan) in self.plan.iter().enumerate() {
+        for (row, map_areas) in self.map_areas.iter().enumerate() {
             for i in 0..BLOCK {
                 let jet = self.jets.jet(row, i);
-                let (counts, square) = (plan[i] > 0.0, jet.squared_curvature());
+                let (counts, square) = (map_areas[i] > 0.0, jet.squared_curvature());
                 squares[i] += if counts { square } else { 0.0 };
-                let area = plan[i] * jet.area_factor();
+                let area = map_areas[i] * jet.area_factor();
                 areas[i] += if counts { area } else { 0.0 };
             }
         }

@@ -84,26 +84,10 @@ mod tests {
 
     use super::*;
     use crate::control::Control;
-    use crate::surface::{FitOptions, HeightSurface, Jet};
+    use crate::surface::in_space::InSpace;
+    use crate::surface::{FitOptions, HeightSurface};
     use crate::synthetic::{Synthetic, SyntheticKind};
     use crate::terrain::Crs;
-
-    /// Heights as a surface in space.
-    struct InSpace<'a>(&'a HeightSurface);
-
-    impl Surface for InSpace<'_> {
-        fn cols(&self) -> usize {
-            self.0.cols()
-        }
-
-        fn rows(&self) -> usize {
-            self.0.rows()
-        }
-
-        fn jet(&self, at: DVec2) -> Jet {
-            Jet::Space(self.0.space_jet(at))
-        }
-    }
 
     #[test]
     fn on_the_map_and_in_space_gentle_ground_measures_the_same() {
@@ -114,7 +98,7 @@ mod tests {
             crate::terrain::Terrain::new(gentle.frame().clone(), heights, Crs::none()).unwrap();
         let surface =
             HeightSurface::fit(&terrain, &FitOptions::default(), &Control::default()).unwrap();
-        let (map, space) = (surface.measures(), InSpace(&surface).measures());
+        let (map, space) = (surface.measures(), InSpace::new(&surface).measures());
         assert!((map.area / space.area - 1.0).abs() < 1e-12, "{map:?} {space:?}");
         assert!((map.area / (600.0 * 400.0) - 1.0).abs() < 1e-6, "{map:?}");
         assert!((map.extent / space.extent - 1.0).abs() < 1e-5, "{map:?} {space:?}");

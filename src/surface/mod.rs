@@ -8,6 +8,8 @@ mod block;
 mod bspline;
 mod curvature;
 mod height;
+#[cfg(test)]
+pub(crate) mod in_space;
 mod jet;
 mod measures;
 mod nurbs;

@@ -5,7 +5,7 @@
 //! and [`relief`](Synthetic::with_relief) that of its vertical shape. The same kind, seed, extent and
 //! relief at a finer spacing is the same terrain; the noisy ones gain detail down to four cells.
 //!
-//! A new kind is a file beside these that holds its shape, and a line in the list of `kind.rs`.
+//! A new kind is a file with these that holds its shape, and a line in the list of `kind.rs`.
 //!
 //! Heights have the same bits on every run, thread count and platform.
 //!

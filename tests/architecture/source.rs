@@ -60,7 +60,7 @@ impl Source {
     ) -> usize {
         let text = read(file).unwrap_or_else(|| panic!("no file {}", file.display()));
         let tokens = text.parse().unwrap_or_else(|e| panic!("{}: {e}", file.display()));
-        // `a/mod.rs` and roots have their modules beside them, `a.rs` in the folder `a`.
+        // `a/mod.rs` and roots have their modules next to them, `a.rs` in the folder `a`.
         let is_owner = parent.is_none() || file.ends_with("mod.rs");
         let folder = if is_owner { file.with_file_name("") } else { file.with_extension("") };
         self.add_module(tokens, file, &folder, parent, read)
@@ -90,8 +90,9 @@ impl Source {
             let child = match body {
                 Some(body) => self.add_module(body, file, &folder, Some(index), read),
                 None => {
-                    let beside = folder.with_extension("rs");
-                    let file = if read(&beside).is_some() { beside } else { folder.join("mod.rs") };
+                    let sibling = folder.with_extension("rs");
+                    let file =
+                        if read(&sibling).is_some() { sibling } else { folder.join("mod.rs") };
                     self.add_file(&file, Some(index), read)
                 }
             };

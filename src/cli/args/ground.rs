@@ -59,16 +59,24 @@ impl FitArgs {
     }
 }
 
+/// The one metric of a command.
+#[derive(Debug, Args)]
+pub(crate) struct MetricChoice {
+    /// The metric [default: curvature, or tensor with --tensor].
+    #[arg(long, value_parser = metric(), value_name = "METRIC")]
+    pub(crate) metric: Option<NamedMetric>,
+}
+
 /// What a metric needs to know, and what composes with all of them.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Metric")]
 pub(crate) struct MetricArgs {
-    /// How much straight, uncurved ground costs beside curved: `auto` (a tenth of the
+    /// How much straight, uncurved ground costs in comparison with curved: `auto` (a tenth of the
     /// root-mean-square curvature; all of it in the curvature tensors that the difference metrics compare), `auto:SHARE`, or a
     /// curvature in 1/m.
     #[arg(long, value_name = "1/M", default_value = "auto", value_parser = delta, allow_hyphen_values = true)]
     pub(crate) delta: OrAuto<Delta>,
-    /// How much ground of even shape costs beside ground where the curvature changes, on the difference metrics: `auto` (the
+    /// How much ground of even shape costs in comparison with ground where the curvature changes, on the difference metrics: `auto` (the
     /// square of the mean rate of change), `auto:SHARE` of it, or a number in their own unit (none; m² if literal).
     #[arg(long, value_name = "VALUE", default_value = "auto", value_parser = difference_delta, allow_hyphen_values = true)]
     pub(crate) difference_delta: OrAuto<Delta>,
@@ -123,7 +131,7 @@ impl MetricArgs {
     }
 
     /// # Errors
-    /// `--tensor` beside metrics that do not look at it.
+    /// `--tensor` with metrics that do not look at it.
     pub(crate) fn check_tensor(&self, metrics: &[NamedMetric]) -> Result<()> {
         if self.tensor.is_some() && !metrics.iter().any(|metric| metric.name == TENSOR) {
             return Err(Failure::usage(

@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ridgeway::Solver;
-use ridgeway::metric::NamedMetric;
 use ridgeway::region::SegmentOptions;
 
-use super::ground::{GroundArgs, metric};
+use super::ground::{GroundArgs, MetricChoice};
 use super::values::{positive, share, size};
 
 #[derive(Debug, Args)]
@@ -23,9 +22,8 @@ Examples:
 pub(crate) struct SegmentArgs {
     /// The DEM.
     pub(crate) dem: PathBuf,
-    /// The metric [default: curvature, or tensor with --tensor].
-    #[arg(long, value_parser = metric(), value_name = "METRIC")]
-    pub(crate) metric: Option<NamedMetric>,
+    #[command(flatten)]
+    pub(crate) choice: MetricChoice,
     /// The file to write: .geojson (polygons with statistics), .tif (number of each cell's region, a band per level; 0 for
     /// none) or .png (map); may be given several times.
     #[arg(short, long, value_name = "FILE")]
@@ -52,10 +50,9 @@ pub(crate) struct MatchArgs {
     /// One or two surfaces: DEMs, or NURBS surfaces in .json files.
     #[arg(required = true, num_args = 1..=2, value_name = "SURFACE")]
     pub(crate) surfaces: Vec<PathBuf>,
-    /// The metric of the regions [default: curvature, or tensor with --tensor].
-    #[arg(long, value_parser = metric(), value_name = "METRIC")]
-    pub(crate) metric: Option<NamedMetric>,
-    /// Let sizes count beside shapes.
+    #[command(flatten)]
+    pub(crate) choice: MetricChoice,
+    /// Let sizes count as well as shapes.
     #[arg(long)]
     pub(crate) sized: bool,
     /// Nodes along the two parameters of a NURBS surface.

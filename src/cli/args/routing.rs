@@ -6,7 +6,7 @@ use clap::Args;
 use ridgeway::metric::NamedMetric;
 use ridgeway::plan::Place;
 
-use super::ground::{GroundArgs, metric};
+use super::ground::{GroundArgs, MetricChoice, metric};
 use super::values::{not_negative, place, positive};
 
 #[derive(Debug, Args)]
@@ -22,9 +22,8 @@ pub(crate) struct DistanceArgs {
     /// Places whose distance to print; may be given several times.
     #[arg(long, value_name = "PLACE", value_parser = place, allow_hyphen_values = true)]
     pub(crate) goal: Vec<Place>,
-    /// The metric [default: curvature, or tensor with --tensor].
-    #[arg(long, value_parser = metric(), value_name = "METRIC")]
-    pub(crate) metric: Option<NamedMetric>,
+    #[command(flatten)]
+    pub(crate) choice: MetricChoice,
     /// The GeoTIFF to write; cells that cannot be reached are nodata.
     #[arg(short, long, value_name = "FILE.tif")]
     pub(crate) output: Option<PathBuf>,
@@ -71,9 +70,8 @@ pub(crate) struct RouteArgs {
     /// Where to go; may be given several times, for one route each.
     #[arg(long, value_name = "PLACE", value_parser = place, required = true, allow_hyphen_values = true)]
     pub(crate) goal: Vec<Place>,
-    /// The metric [default: curvature, or tensor with --tensor].
-    #[arg(long, value_parser = metric(), value_name = "METRIC")]
-    pub(crate) metric: Option<NamedMetric>,
+    #[command(flatten)]
+    pub(crate) choice: MetricChoice,
     /// The file to write: .geojson, .gpx or .csv (a profile); may be given several times.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Vec<PathBuf>,

@@ -31,7 +31,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     if let Some(path) = &args.isolines {
         check_file(path, &["geojson", "json"], args.overwrite, Some(&args.dem))?;
     }
-    let name = args.ground.metric.chosen(args.metric)?;
+    let name = args.ground.metric.chosen(args.choice.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
     let (scenario, _) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = scenario::bind(&scenario, name, &args.ground, run, control)?;

@@ -143,7 +143,8 @@ fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Sourc
     }
     let (cols, rows) = args.nodes;
     let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
-    let metric = args.ground.metric.metric(args.metric.unwrap_or(metric_named(CURVATURE)), None)?;
+    let metric =
+        args.ground.metric.metric(args.choice.metric.unwrap_or(metric_named(CURVATURE)), None)?;
     let sampled =
         SampledMetric::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
     Ok((Source::Nurbs(Box::new(surface)), sampled))
@@ -155,7 +156,7 @@ fn open_dem(
     run: &RunArgs,
     control: &Control,
 ) -> Result<(Source, SampledMetric)> {
-    let name = args.ground.metric.chosen(args.metric)?;
+    let name = args.ground.metric.chosen(args.choice.metric)?;
     let places = (&[][..], &[][..]);
     let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;

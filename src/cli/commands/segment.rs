@@ -30,7 +30,7 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         .iter()
         .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
         .collect::<Result<Vec<_>>>()?;
-    let name = args.ground.metric.chosen(args.metric)?;
+    let name = args.ground.metric.chosen(args.choice.metric)?;
     let places = (&[][..], &[][..]);
     let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let relief = formats.iter().any(|format| format == "png").then_some(terrain);
@@ -100,12 +100,18 @@ fn measures(
     surface: &HeightSurface,
     control: &Control,
 ) -> ridgeway::Result<Vec<Vec<(RegionStatistics, Signature)>>> {
-    let of_level = |level: &Level| {
-        control.report("measuring", 0.0);
-        let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
-        Ok(region_statistics(surface, level).into_iter().zip(signatures).collect())
-    };
-    segmentation.levels.iter().map(of_level).collect()
+    let levels = segmentation.levels.iter();
+    levels.map(|level| measures_of_level(level, surface, control)).collect()
+}
+
+fn measures_of_level(
+    level: &Level,
+    surface: &HeightSurface,
+    control: &Control,
+) -> ridgeway::Result<Vec<(RegionStatistics, Signature)>> {
+    control.report("measuring", 0.0);
+    let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
+    Ok(region_statistics(surface, level).into_iter().zip(signatures).collect())
 }
 
 /// Regions with their statistics and signatures.
@@ -141,12 +147,11 @@ impl Regions<'_> {
     }
 
     fn write_labels(&self, path: &std::path::Path, overwrite: bool) -> Result<()> {
-        let number = |label: &Option<u32>| label.map_or(0, |label| label + 1);
-        let numbers = |level: &Level| level.labels.iter().map(number).collect::<Vec<u32>>();
-        let numbers: Vec<_> = self.segmentation.levels.iter().map(numbers).collect();
-        let name = |depth: usize| format!("region of level {}", depth + 1);
-        let bands: Vec<_> =
-            numbers.iter().enumerate().map(|(i, n)| (name(i), Samples::U32(n))).collect();
+        let levels: Vec<_> = self.segmentation.levels.iter().map(numbers).collect();
+        let bands: Vec<_> = (1..)
+            .zip(&levels)
+            .map(|(depth, numbers)| (format!("region of level {depth}"), Samples::U32(numbers)))
+            .collect();
         Ok(write_raster(path, overwrite, &self.scenario.georeference, &bands)?)
     }
 
@@ -223,6 +228,11 @@ impl Regions<'_> {
         }
         table
     }
+}
+
+/// The number of the region of each node, from 1; 0 for none.
+fn numbers(level: &Level) -> Vec<u32> {
+    level.labels.iter().map(|label| label.map_or(0, |label| label + 1)).collect()
 }
 
 /// An area with its unit: `823 m²`, `12.34 km²`.

@@ -112,14 +112,17 @@ impl DistanceReport {
 
 /// Number of the cells that are reached and the largest distance of one.
 fn reached(map: &DistanceMap) -> (usize, f64) {
-    let of_row = |row| {
-        let values = (0..map.cols()).map(|col| f64::from(map.at_node(col, row) as f32));
-        values
-            .filter(|value| value.is_finite())
-            .fold((0, 0.0), |(count, largest), value| (count + 1, value.max(largest)))
-    };
-    let both = |a: (usize, f64), b: (usize, f64)| (a.0 + b.0, a.1.max(b.1));
-    (0..map.rows()).into_par_iter().map(of_row).reduce(|| (0, 0.0), both)
+    (0..map.rows())
+        .into_par_iter()
+        .map(|row| reached_in_row(map, row))
+        .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1.max(b.1)))
+}
+
+fn reached_in_row(map: &DistanceMap, row: usize) -> (usize, f64) {
+    let values = (0..map.cols()).map(|col| f64::from(map.at_node(col, row) as f32));
+    values
+        .filter(|value| value.is_finite())
+        .fold((0, 0.0), |(count, largest), value| (count + 1, value.max(largest)))
 }
 
 /// Quantiles of the distances and mean of the estimated errors.
@@ -127,19 +130,23 @@ fn quantiles_and_error(map: &DistanceMap) -> DistanceStatistics {
     let mut values = map.to_row_major();
     values.retain(|value| value.is_finite());
     values.par_sort_unstable_by(f32::total_cmp);
-    let quantile = |share: f64| {
-        let rank = (values.len().checked_sub(1)? as f64 * share) as usize;
-        Some(values[rank].into())
-    };
+    let [percent_10, percent_25, median, percent_75, percent_90] =
+        [0.1, 0.25, 0.5, 0.75, 0.9].map(|share| quantile(&values, share));
     DistanceStatistics {
-        percent_10: quantile(0.1),
-        percent_25: quantile(0.25),
-        median: quantile(0.5),
-        percent_75: quantile(0.75),
-        percent_90: quantile(0.9),
+        percent_10,
+        percent_25,
+        median,
+        percent_75,
+        percent_90,
         largest: None,
         mean_error: mean_error(map),
     }
+}
+
+/// The value that a share of ascending values lies below.
+fn quantile(values: &[f32], share: f64) -> Option<f64> {
+    let rank = (values.len().checked_sub(1)? as f64 * share) as usize;
+    Some(values[rank].into())
 }
 
 /// Mean of the estimated errors of the reached cells; `None` where there are none.

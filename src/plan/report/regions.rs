@@ -123,15 +123,20 @@ impl MatchReport {
     /// The matches that were found among surfaces.
     #[must_use]
     pub fn new(surfaces: Vec<MatchedSurface>, found: &[Match], command: Option<String>) -> Self {
-        let pair = |pair: &Match| MatchedPair {
+        let matches = found.iter().map(MatchedPair::from).collect();
+        Self { surfaces, matches, software: SOFTWARE, command }
+    }
+}
+
+impl From<&Match> for MatchedPair {
+    fn from(pair: &Match) -> Self {
+        Self {
             first: pair.first + 1,
             second: pair.second + 1,
             dissimilarity: pair.distance,
             size_ratio: pair.size_ratio,
             mutual: pair.mutual,
-        };
-        let matches = found.iter().map(pair).collect();
-        Self { surfaces, matches, software: SOFTWARE, command }
+        }
     }
 }
 
@@ -139,12 +144,12 @@ impl MatchedSurface {
     /// The regions of the surface in `file`, with their seeds and signatures.
     #[must_use]
     pub fn new(file: &Path, regions: impl Iterator<Item = (Vec<f64>, Signature)>) -> Self {
-        let region = |(i, (seed, signature)): (usize, (Vec<f64>, Signature))| MatchedRegion {
-            region: i + 1,
+        let regions = (1..).zip(regions).map(|(region, (seed, signature))| MatchedRegion {
+            region,
             seed,
             size_m: signature.size,
             signature: signature.eigenvalues,
-        };
-        Self { file: file_name(file), regions: regions.enumerate().map(region).collect() }
+        });
+        Self { file: file_name(file), regions: regions.collect() }
     }
 }

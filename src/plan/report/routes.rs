@@ -30,11 +30,14 @@ impl RouteReport {
     /// The numbers of routes with names.
     #[must_use]
     pub fn new(routes: &[(&str, &Route)], provenance: Provenance) -> Self {
-        let named = |&(name, route): &(&str, &Route)| NamedRoute {
-            name: name.to_owned(),
-            summary: route.summary.clone(),
-        };
-        Self { routes: routes.iter().map(named).collect(), provenance }
+        let routes = routes.iter().map(|(name, route)| NamedRoute::new(name, route)).collect();
+        Self { routes, provenance }
+    }
+}
+
+impl NamedRoute {
+    fn new(name: &str, route: &Route) -> Self {
+        Self { name: name.to_owned(), summary: route.summary.clone() }
     }
 }
 
@@ -76,19 +79,28 @@ impl ComparisonReport {
         comparison: &Comparison,
         provenance: Provenance,
     ) -> Self {
-        let cost = |metric: usize, route: usize| Cost {
-            cost: comparison.costs[metric][route],
-            unit: fields[metric].unit(),
-            ratio_to_best: comparison.ratio(metric, route),
-        };
-        let names = || fields.iter().map(|field| field.name().to_owned());
-        let routes = names().zip(&comparison.routes).enumerate().map(|(r, (name, route))| {
-            let costs = names().enumerate().map(|(m, metric)| (metric, cost(m, r)));
-            ComparedRoute {
-                route: NamedRoute { name, summary: route.summary.clone() },
-                costs: costs.collect(),
-            }
+        let routes = fields.iter().zip(&comparison.routes).enumerate();
+        let routes = routes.map(|(r, (field, route))| ComparedRoute {
+            route: NamedRoute::new(field.name(), route),
+            costs: costs_of(r, fields, comparison),
         });
         Self { routes: routes.collect(), provenance }
     }
+}
+
+/// What a route of a comparison costs under each metric.
+fn costs_of(
+    route: usize,
+    fields: &[MetricField<'_>],
+    comparison: &Comparison,
+) -> BTreeMap<String, Cost> {
+    let costs = fields.iter().enumerate().map(|(metric, field)| {
+        let cost = Cost {
+            cost: comparison.costs[metric][route],
+            unit: field.unit(),
+            ratio_to_best: comparison.ratio(metric, route),
+        };
+        (field.name().to_owned(), cost)
+    });
+    costs.collect()
 }

@@ -131,7 +131,7 @@ fn changes(tensors: &Tensors<'_>, run: &Run<'_>) -> [Lanes; 3] {
     changes
 }
 
-/// The same beside a border or a seam: one-sided where a neighbour is missing.
+/// The same next to a border or a seam: one-sided where a neighbour is missing.
 #[inline(never)]
 fn changes_at_border(tensors: &Tensors<'_>, node: [usize; 2], region: u32) -> [f64; 3] {
     let [x, y] = [[1, 0], [0, 1]].map(|line| derivative_at_border(tensors, node, line, region));

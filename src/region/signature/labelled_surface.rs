@@ -104,7 +104,7 @@ impl LabelledSurface<'_> {
         rows
     }
 
-    /// Index of the node at a column and row in the grid or beside it, over the seam of a closed direction; `None` beyond a border.
+    /// Index of the node at a column and row in the grid or next to it, over the seam of a closed direction; `None` beyond a border.
     pub(super) fn node(&self, col: isize, row: isize) -> Option<usize> {
         let [across, down] = self.periodic;
         Some(wrap(row, self.rows, down)? * self.cols + wrap(col, self.cols, across)?)

@@ -51,6 +51,14 @@ pub enum Neighbours {
 }
 
 impl Signature {
+    fn new(differences: &Moments, size: &Size) -> Self {
+        let is_flat = size.is_flat;
+        Self {
+            eigenvalues: if is_flat { [0.0; 4] } else { eigenvalues(differences.covariance()) },
+            size: size.side,
+        }
+    }
+
     /// Dissimilarity of two shapes, 0 (alike) to 1: `Σ |σ_i − σ'_i| / Σ (σ_i + σ'_i)` with `σ = √λ` (Bray and Curtis 1957). Sums below 1e-3
     /// count as none: a surface that bends has some 1.
     #[must_use]
@@ -116,11 +124,7 @@ pub fn signatures(
         }
         Neighbours::Grid => along_grid(&tensors, &sizes, run, moments),
     })?;
-    let signature = |(sum, size): (&Moments, &Size)| Signature {
-        eigenvalues: if size.is_flat { [0.0; 4] } else { eigenvalues(sum.covariance()) },
-        size: size.side,
-    };
-    Ok(sums.iter().zip(&sizes).map(signature).collect())
+    Ok(sums.iter().zip(&sizes).map(|(sum, size)| Signature::new(sum, size)).collect())
 }
 
 #[cfg(test)]
@@ -129,6 +133,7 @@ mod tests {
 
     use super::*;
     use crate::linalg::Sym2;
+    use crate::surface::in_space::InSpace;
     use crate::surface::{FitOptions, HeightSurface, Jet, SurfaceJet};
     use crate::synthetic::{Synthetic, SyntheticKind};
     use crate::terrain::Crs;
@@ -150,7 +155,7 @@ mod tests {
         }
 
         /// `x` and its derivatives by grid coordinates; `x` runs beyond the unit disc on all sides.
-        fn plan(&self, at: DVec2) -> [DVec2; 6] {
+        fn phi(&self, at: DVec2) -> [DVec2; 6] {
             let step = 3.0 / (self.nodes - 1) as f64;
             let turn = DVec2::from_angle(self.turn);
             let DVec2 { x: u, y: v } = at * step - 1.5;
@@ -189,7 +194,7 @@ mod tests {
         fn labels(&self) -> Vec<Option<u32>> {
             let at = |i: usize| DVec2::new((i % self.nodes) as f64, (i / self.nodes) as f64);
             (0..self.nodes * self.nodes)
-                .map(|i| (self.plan(at(i))[0].length() < 1.0).then_some(0))
+                .map(|i| (self.phi(at(i))[0].length() < 1.0).then_some(0))
                 .collect()
         }
 
@@ -208,7 +213,7 @@ mod tests {
         }
 
         fn jet(&self, at: DVec2) -> Jet {
-            let [x, x1, x2, x11, x12, x22] = self.plan(at);
+            let [x, x1, x2, x11, x12, x22] = self.phi(at);
             let (z, gradient, hessian) = self.height(x);
             let first = |a: DVec2| a.extend(gradient.dot(a)) * self.scale;
             let second = |a: DVec2, b: DVec2, ab: DVec2| {
@@ -306,23 +311,6 @@ mod tests {
         signatures(surface, &labels, Neighbours::Surface, &Control::default()).unwrap()
     }
 
-    /// A height surface that does not say that it is one.
-    struct Unsaid(HeightSurface);
-
-    impl Surface for Unsaid {
-        fn cols(&self) -> usize {
-            self.0.cols()
-        }
-
-        fn rows(&self) -> usize {
-            self.0.rows()
-        }
-
-        fn jet(&self, at: DVec2) -> Jet {
-            Jet::Space(self.0.space_jet(at))
-        }
-    }
-
     #[test]
     fn neither_threads_nor_blocks_of_heights_change_anything() {
         let range = Synthetic::new(SyntheticKind::Range, 75, 53, 30.0).unwrap();
@@ -339,7 +327,7 @@ mod tests {
         };
         let one = with(1);
         assert!([2, 5].into_iter().all(|threads| with(threads) == one));
-        for (block, single) in one.iter().zip(of_all(&Unsaid(heights), label)) {
+        for (block, single) in one.iter().zip(of_all(&InSpace::new(&heights), label)) {
             assert!(change(*block, single) < 1e-9, "{block:?} {single:?}");
         }
     }

@@ -62,7 +62,7 @@ impl<'a> Tensors<'a> {
         Ok(Self { labelled, of, inner: labelled.inner_cells() })
     }
 
-    /// The tensor at a column and row in or beside the grid; `None` unless the node belongs to the region.
+    /// The tensor at a column and row in or next to the grid; `None` unless the node belongs to the region.
     pub(super) fn at(&self, col: isize, row: isize, region: u32) -> Option<&Tensor> {
         let node = self.labelled.node(col, row)?;
         (self.labelled.labels[node] == Some(region)).then(|| &self.of[node])
@@ -115,7 +115,7 @@ impl<'a> Tensors<'a> {
         self.sample(at, region).map_or(MISSING, |there| squared_distance(&there, &self.of[node]))
     }
 
-    /// The tensor beside a border or a seam: nodes one by one, and only those that count.
+    /// The tensor next to a border or a seam: nodes one by one, and only those that count.
     #[inline(never)]
     fn sample(&self, at: DVec2, region: u32) -> Option<Tensor> {
         // Beside a pole a short line may go round it many times.

@@ -1,6 +1,6 @@
 //! Polishing: a line is moved sideways until its length on the surface is least.
 //!
-//! The traced line inherits the error of the distance it descends on: it lies up to a cell or two beside the
+//! The traced line inherits the error of the distance it descends on: it lies up to a cell or two off the
 //! shortest line. From there Newton's method finds that line on the metric itself. With a unit vector `n_i` across the
 //! line at each point, the points `p_i + s_i n_i` make the segments `d = p_{i+1} − p_i` with middles `c`, and
 //!
@@ -36,7 +36,7 @@ use crate::metric::length_along;
 const SEGMENT: f64 = 0.5;
 /// Most steps of Newton's method, and of the search at each stride. Enough for all but a few lines on the roughest ground; smooth metrics need 3 to 5.
 const MOST_STEPS: usize = 40;
-/// A line that ends with a larger shift hardly moved, for the metric jumps beside it. The curvature tensor on rough ground ends
+/// A line that ends with a larger shift hardly moved, for the metric jumps next to it. The curvature tensor on rough ground ends
 /// with up to 200, costs that jump by 1 : 10 with 70 to 3000, by 1 : 50 with 27 000.
 const JUMP: f64 = 1e3;
 

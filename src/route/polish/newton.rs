@@ -219,7 +219,7 @@ impl Newton {
     fn step(&self, shift: f64, held: &[bool]) -> Option<Vec<f64>> {
         let last = self.gradient.len() - 1;
         let is_free = |i: usize| i > 0 && i < last && !held[i];
-        // L D Lᵀ: `multiplier` is the entry of L beside the diagonal in row i.
+        // L D Lᵀ: `multiplier` is the entry of L next to the diagonal in row i.
         let mut pivots = vec![f64::INFINITY; self.gradient.len()];
         let mut step = vec![0.0; self.gradient.len()];
         for i in (0..last).filter(|&i| is_free(i)) {

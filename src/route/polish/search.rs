@@ -1,4 +1,4 @@
-//! Dynamic programming over lines beside a line.
+//! Dynamic programming over the lines on both sides of a line.
 
 use glam::DVec2;
 
@@ -10,7 +10,7 @@ const STRIDES: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 /// A search that shortens the line by less than this share goes on with the next stride.
 const WORTH: f64 = 1e-4;
 
-/// The line moved sideways by ever smaller steps, each time to the best of all lines beside it.
+/// The line moved sideways by ever smaller steps, each time to the best of the lines on both sides of it.
 pub(super) fn search(
     mut line: Vec<DVec2>,
     metric: &impl Fn(DVec2) -> Sym2,

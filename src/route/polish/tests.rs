@@ -159,7 +159,7 @@ fn lines_into_costly_ground_are_refracted() {
 
 #[test]
 fn lines_go_around_a_costly_block() {
-    // A string around the cheap nodes beside the block; the corners of the ramp save it a trifle.
+    // A string around the cheap nodes next to the block; the corners of the ramp save it a trifle.
     let (start, goal) = (DVec2::new(60.0, 20.0), DVec2::new(62.0, 100.0));
     for ratio in [50.0, 1000.0] {
         let block = |c: i64, r: i64| (40..=80).contains(&c) && (50..=70).contains(&r);

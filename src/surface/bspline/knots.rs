@@ -27,12 +27,12 @@ impl FitPlan {
 
     /// No more knots than a cut-off of `cutoff` metres needs.
     pub(in crate::surface) fn smooth(frame: &GridFrame, degree: usize, cutoff: f64) -> Self {
-        let needed = |nodes: usize, spacing: f64| {
-            let intervals = (nodes - 1) as f64 * spacing * KNOTS_PER_CUTOFF / cutoff;
-            (intervals.ceil() as usize).max(degree).min(nodes - 1)
-        };
         let widest = (0..frame.rows()).map(|r| frame.spacing(r as f64).x).fold(0.0, f64::max);
-        let intervals = [needed(frame.cols(), widest), needed(frame.rows(), frame.mid_spacing().y)];
+        let axes = [(frame.cols(), widest), (frame.rows(), frame.mid_spacing().y)];
+        let intervals = axes.map(|(nodes, spacing)| {
+            let needed = (nodes - 1) as f64 * spacing * KNOTS_PER_CUTOFF / cutoff;
+            (needed.ceil() as usize).max(degree).min(nodes - 1)
+        });
         Self { degree, intervals, cutoff }
     }
 

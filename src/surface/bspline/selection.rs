@@ -121,21 +121,30 @@ fn golden_section(low: f64, high: f64, f: impl Fn(f64) -> Result<f64>) -> Result
 fn window(frame: &GridFrame, heights: &[f64]) -> Result<(GridFrame, Vec<f64>)> {
     const SIDE: usize = 1024;
     let (cols, rows) = (frame.cols().min(SIDE), frame.rows().min(SIDE));
-    let part = |(col, row): (usize, usize)| {
-        let lines = heights.chunks(frame.cols()).skip(row).take(rows);
-        lines.flat_map(move |line| &line[col..col + cols])
-    };
-    let voids = |place| part(place).filter(|z| !z.is_finite()).count();
-    let off_middle = |(col, row): (usize, usize)| {
-        (2 * col).abs_diff(frame.cols() - cols) + (2 * row).abs_diff(frame.rows() - rows)
-    };
-    let place = window_starts(frame.rows(), rows)
-        .flat_map(|row| window_starts(frame.cols(), cols).map(move |col| (col, row)))
-        .min_by_key(|&place| (voids(place), off_middle(place)))
+    let [col, row] = window_starts(frame.rows(), rows)
+        .flat_map(|row| window_starts(frame.cols(), cols).map(move |col| [col, row]))
+        .min_by_key(|&[col, row]| {
+            let part = part(heights, frame.cols(), [col, row], [cols, rows]);
+            let voids = part.filter(|z| !z.is_finite()).count();
+            let off_middle =
+                (2 * col).abs_diff(frame.cols() - cols) + (2 * row).abs_diff(frame.rows() - rows);
+            (voids, off_middle)
+        })
         .unwrap_or_default();
-    let corner = frame.to_map(DVec2::new(place.0 as f64, place.1 as f64));
+    let corner = frame.to_map(DVec2::new(col as f64, row as f64));
     let window = GridFrame::new(cols, rows, corner, frame.step(), frame.ground())?;
-    Ok((window, part(place).copied().collect()))
+    Ok((window, part(heights, frame.cols(), [col, row], [cols, rows]).copied().collect()))
+}
+
+/// The heights of `cols` columns and `rows` rows from a node on, of lines `width` long.
+fn part(
+    heights: &[f64],
+    width: usize,
+    [col, row]: [usize; 2],
+    [cols, rows]: [usize; 2],
+) -> impl Iterator<Item = &f64> {
+    let lines = heights.chunks(width).skip(row).take(rows);
+    lines.flat_map(move |line| &line[col..col + cols])
 }
 
 /// First nodes of windows `side` long that overlap or touch, an odd number, so that one is in the middle.

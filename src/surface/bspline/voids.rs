@@ -15,7 +15,7 @@ use crate::control::Control;
 use crate::error::Result;
 use crate::grid::GridFrame;
 
-/// Most refits. On waves with noise around a hole (the test of heights beside voids) the largest change of
+/// Most refits. On waves with noise around a hole (the test of heights next to voids) the largest change of
 /// curvature against the fit without a hole is 0.063, 0.057, 0.055 and 0.053 /m after 0, 2, 4 and 100.
 const ROUNDS: usize = 2;
 
@@ -23,7 +23,7 @@ const ROUNDS: usize = 2;
 const CONVERGED: f64 = 1e-7;
 
 /// Shortest cut-off of the first guess, in cells: it must see past single noisy heights. Interpolating
-/// SRTM with holes, the error of the curvature beside them is 4.5, 3.4 and 4.4 /km for 2, 4 and 8 cells.
+/// SRTM with holes, the error of the curvature next to them is 4.5, 3.4 and 4.4 /km for 2, 4 and 8 cells.
 const SHORTEST_CUTOFF: f64 = 4.0;
 
 /// Cut-offs from the data beyond which a continuation is held to straight lines.

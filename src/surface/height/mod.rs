@@ -182,17 +182,17 @@ impl HeightSurface {
         let (mut sums, mut count) = ([0.0; 2], 0);
         for col in (0..cols).step_by(BLOCK) {
             self.fit.jets(&self.per_metre, col, first..rows.min(first + BLOCK), &mut jets);
-            let mut plan = [[0.0; BLOCK]; BLOCK];
-            for (row, plan) in (first..rows).zip(&mut plan) {
+            let mut map_areas = [[0.0; BLOCK]; BLOCK];
+            for (row, map_areas) in (first..rows).zip(&mut map_areas) {
                 let cell = share(row, rows, false) / self.per_metre[row].element_product();
-                for (col, plan) in (col..cols).zip(plan) {
+                for (col, map_area) in (col..cols).zip(map_areas) {
                     if !self.is_void(col, row) {
-                        *plan = share(col, cols, false) * cell;
+                        *map_area = share(col, cols, false) * cell;
                         count += 1;
                     }
                 }
             }
-            let [square, area] = simd::dispatch(BlockSums { jets: &jets, plan: &plan });
+            let [square, area] = simd::dispatch(BlockSums { jets: &jets, map_areas: &map_areas });
             sums = [sums[0] + square, sums[1] + area];
         }
         (sums, count)

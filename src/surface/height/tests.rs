@@ -356,7 +356,7 @@ fn quadratics_with_voids_are_reproduced() {
 }
 
 #[test]
-fn voids_hardly_disturb_the_heights_beside_them() {
+fn voids_hardly_disturb_the_heights_around_them() {
     let frame = unit_frame(60, 50);
     let rough = noise(frame.nodes());
     let z = |c: f64, r: f64| {

@@ -19,13 +19,7 @@ impl NurbsSurface {
     pub fn revolve(profile: &NurbsCurve, origin: DVec3, axis: DVec3) -> Result<Self> {
         let axis =
             axis.try_normalize().ok_or_else(|| Error::argument("the axis", axis, "a direction"))?;
-        let around = |p: &DVec4| {
-            let arm = p.xyz() / p.w - origin;
-            let out = arm.reject_from_normalized(axis);
-            ring(origin + arm - out, out, axis.cross(out))
-                .map(|q| (q.xyz() * q.w).extend(q.w) * p.w)
-        };
-        let net = profile.net.iter().flat_map(around).collect();
+        let net = profile.net.iter().flat_map(|&p| turned_about(p, origin, axis)).collect();
         Self::from_net([ring_knots()?, profile.knots.clone()], [true, profile.closed], net)
     }
 
@@ -90,18 +84,24 @@ impl NurbsSurface {
         }
         let sections: Vec<NurbsCurve> = frames(trajectory, up, stations)?
             .into_iter()
-            .map(|Frame { at, along, up }| {
-                let right = along.cross(up);
-                let place =
-                    |p: &DVec4| (right * p.x + up * p.y + along * p.z + at * p.w).extend(p.w);
-                NurbsCurve { net: section.net.iter().map(place).collect(), ..section.clone() }
+            .map(|frame| {
+                let net = section.net.iter().map(|&p| frame.to_space(p)).collect();
+                NurbsCurve { net, ..section.clone() }
             })
             .collect();
         Self::loft(&sections, 3)
     }
 }
 
-/// A place on a trajectory, with unit vectors along it and up.
+/// Control points of the circle that a control point makes when it turns about an axis.
+fn turned_about(p: DVec4, origin: DVec3, axis: DVec3) -> impl Iterator<Item = DVec4> {
+    let arm = p.xyz() / p.w - origin;
+    let out = arm.reject_from_normalized(axis);
+    let circle = ring(origin + arm - out, out, axis.cross(out));
+    circle.into_iter().map(move |q| (q.xyz() * q.w).extend(q.w) * p.w)
+}
+
+/// A point of a trajectory, with unit vectors along it and up.
 #[derive(Clone, Copy)]
 struct Frame {
     at: DVec3,
@@ -142,13 +142,18 @@ fn frames(trajectory: &NurbsCurve, up: DVec3, count: usize) -> Result<Vec<Frame>
 }
 
 impl Frame {
+    /// A control point `(w x, w y, w z, w)` to the right, up and along, in space.
+    fn to_space(self, p: DVec4) -> DVec4 {
+        let Self { at, along, up } = self;
+        let right = along.cross(up);
+        (right * p.x + up * p.y + along * p.z + at * p.w).extend(p.w)
+    }
+
     /// Both vectors reflected at the plane across `by`.
     fn reflected(self, by: DVec3) -> Self {
-        let reflect = |v: DVec3| match by.try_normalize() {
-            Some(normal) => v - 2.0 * v.dot(normal) * normal,
-            None => v,
-        };
-        Self { along: reflect(self.along), up: reflect(self.up), ..self }
+        let Some(normal) = by.try_normalize() else { return self };
+        let [along, up] = [self.along, self.up].map(|v| v - 2.0 * v.dot(normal) * normal);
+        Self { along, up, ..self }
     }
 }
 

@@ -1,9 +1,4 @@
-use proptest::prelude::*;
-
 use super::*;
-use crate::control::Control;
-use crate::eikonal::TensorField;
-use crate::metric::{Curvature, Metric, Modifiers};
 use crate::surface::Surface;
 
 /// A half circle of radius 2 about the origin from the top of the z axis to its bottom.
@@ -230,47 +225,4 @@ fn areas_and_mean_curvatures_are_those_of_the_surface() {
     let cone = NurbsSurface::revolve(&side, DVec3::ZERO, DVec3::Z).unwrap();
     let rms = |n| cone.clone().on_grid(n, n).unwrap().measures().rms_curvature;
     assert!(rms(200) < 1.15 * rms(100), "{} {}", rms(200), rms(100));
-}
-
-/// Degree and knots, right or wrong.
-fn any_knots() -> impl Strategy<Value = (usize, Vec<f64>)> {
-    let step = prop_oneof![4 => Just(0.0), 4 => Just(1.0), 1 => -0.5..3.0, 1 => Just(f64::NAN)];
-    (0..5_usize, prop::collection::vec(step, 0..14)).prop_map(|(degree, steps)| {
-        let ascend = steps.iter().scan(0.0, |u, step| {
-            *u += step;
-            Some(*u)
-        });
-        (degree, ascend.collect())
-    })
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
-
-    /// Whatever is accepted can be evaluated everywhere, and is itself again by way of a file.
-    #[test]
-    fn nonsense_is_refused_and_the_rest_is_finite(
-        knots in [any_knots(), any_knots()],
-        closed in any::<[bool; 2]>(),
-        flat in any::<bool>(),
-        points in prop::collection::vec([-1.0..1.0, -1.0..1.0, -1.0..1.0, 0.1..2.0f64], 144),
-    ) {
-        let [Ok(first), Ok(second)] = knots.map(|(degree, knots)| Knots::new(degree, knots)) else {
-            return Ok(());
-        };
-        let count = first.controls() * second.controls();
-        let points: Vec<DVec4> = points.into_iter().cycle().take(count).map(DVec4::from).map(|p| if flat { p.with_z(0.0) } else { p }).collect();
-        let Ok(surface) = NurbsSurface::new([first, second], closed, &points) else { return Ok(()) };
-        for u in places(&surface).chain([DVec2::splat(-1e9), DVec2::splat(1e9)]) {
-            let jet = surface.jet(u);
-            let all = jet.first.iter().chain(&jet.second).chain([&jet.point]);
-            prop_assert!(all.into_iter().all(|v| v.is_finite()));
-        }
-        let again = NurbsSurface::from_json(&surface.to_json()).unwrap();
-        prop_assert!(again.jet(DVec2::ONE).point.distance(surface.jet(DVec2::ONE).point) < 1e-12);
-        let grid = surface.on_grid(5, 4).unwrap();
-        let (none, control) = (Modifiers::default(), Control::default());
-        let metric = Curvature::default().on(&grid, &none, &control).unwrap();
-        TensorField::sample(&metric, &control).unwrap();
-    }
 }
