@@ -26,12 +26,10 @@ fn on_free_side(corners: [bool; 4], at: DVec2, a: DVec2, b: DVec2, cell: DVec2) 
         return false;
     }
     // ... and where a wall runs along a diagonal, the whole segment must lie on one side of it.
-    let side = |p: DVec2, rising: bool| {
-        let q = p - cell;
-        if rising { q.x - q.y } else { q.x + q.y - 1.0 }
-    };
-    let crosses = |rising: bool| side(a, rising) * side(b, rising) < 0.0;
+    let (a, b) = (a - cell, b - cell);
+    let crosses_rising = (a.x - a.y) * (b.x - b.y) < 0.0;
+    let crosses_falling = (a.x + a.y - 1.0) * (b.x + b.y - 1.0) < 0.0;
     let falling_wall = !corners[1] && !corners[2];
     let rising_wall = !corners[0] && !corners[3];
-    !(falling_wall && crosses(false) || rising_wall && crosses(true))
+    !(falling_wall && crosses_falling || rising_wall && crosses_rising)
 }

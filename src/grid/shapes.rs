@@ -48,12 +48,7 @@ impl Shapes {
     /// # Errors
     /// The first error of `to`.
     pub fn try_map<E>(mut self, to: impl Fn(DVec2) -> Result<DVec2, E>) -> Result<Self, E> {
-        let map_line = |line: &mut LineString<f64>| {
-            line.coords_mut().try_for_each(|at| {
-                (at.x, at.y) = to(vector(*at))?.into();
-                Ok(())
-            })
-        };
+        let map_line = |line: &mut LineString<f64>| try_map_line(line, &to);
         for point in &mut self.points {
             *point = to(*point)?;
         }
@@ -148,6 +143,16 @@ fn rings(polygon: &Polygon<f64>) -> impl Iterator<Item = &LineString<f64>> {
 
 fn segments(line: &LineString<f64>) -> impl Iterator<Item = [DVec2; 2]> + '_ {
     line.lines().map(|segment| [vector(segment.start), vector(segment.end)])
+}
+
+fn try_map_line<E>(
+    line: &mut LineString<f64>,
+    to: impl Fn(DVec2) -> Result<DVec2, E>,
+) -> Result<(), E> {
+    line.coords_mut().try_for_each(|at| {
+        (at.x, at.y) = to(vector(*at))?.into();
+        Ok(())
+    })
 }
 
 /// The vertices of a line, each with the vectors to its neighbours. A point that is repeated counts once.

@@ -61,14 +61,10 @@ impl Tiling {
 
     /// The tiles that touch the square `radius` around a point, and perhaps some next to them.
     pub(crate) fn tiles_around(&self, at: DVec2, radius: f64) -> impl Iterator<Item = usize> {
-        let span = |at: f64, count: usize| {
-            let [from, to] =
-                [at - radius - 1.0, at + radius + 1.0].map(|x| (x / SIDE as f64).floor());
-            // `as` clamps to zero and above.
-            from as usize..count.min((to + 1.0) as usize)
-        };
-        let (across, columns) = (self.across, span(at.x, self.across));
-        span(at.y, self.down).flat_map(move |y| columns.clone().map(move |x| y * across + x))
+        let across = self.across;
+        let columns = tiles_touching(at.x, radius, self.across);
+        let rows = tiles_touching(at.y, radius, self.down);
+        rows.flat_map(move |y| columns.clone().map(move |x| y * across + x))
     }
 
     /// Columns and rows of a tile.
@@ -166,12 +162,7 @@ impl Tiling {
         at: DVec2,
         metric: impl Fn(isize, isize) -> Option<Sym2>,
     ) -> Option<Sym2> {
-        let corner = |axis: usize, count: usize| {
-            let corner = at[axis].floor() as isize;
-            let last = count.saturating_sub(2) as isize;
-            if self.periodic[axis] { corner } else { corner.clamp(0, last) }
-        };
-        let (col, row) = (corner(0, self.cols), corner(1, self.rows));
+        let (col, row) = self.cell(at);
         let inside = at - DVec2::new(col as f64, row as f64);
         let mut sum = Sym2::default();
         let mut weight = 0.0;
@@ -184,6 +175,15 @@ impl Tiling {
             }
         }
         (weight > 0.0).then(|| sum * (1.0 / weight))
+    }
+
+    /// The first corner of the cell that holds a point, or is nearest to it.
+    fn cell(&self, at: DVec2) -> (isize, isize) {
+        let corner = |axis: usize, count: usize| match at[axis].floor() as isize {
+            corner if self.periodic[axis] => corner,
+            corner => corner.clamp(0, count.saturating_sub(2) as isize),
+        };
+        (corner(0, self.cols), corner(1, self.rows))
     }
 
     /// The shifts from a point to its periodic images between `least` and `most`; in a direction that is not periodic there is
@@ -204,6 +204,13 @@ impl Tiling {
         let image = move |i: isize, j: isize| DVec2::new(i as f64, j as f64) * period;
         along(1).flat_map(move |j| along(0).map(move |i| image(i, j)))
     }
+}
+
+/// Columns or rows of `count` tiles that come within `radius` of a coordinate, and perhaps one more on either side.
+fn tiles_touching(at: f64, radius: f64, count: usize) -> Range<usize> {
+    let [from, to] = [at - radius - 1.0, at + radius + 1.0].map(|x| (x / SIDE as f64).floor());
+    // `as` clamps to zero and above.
+    from as usize..count.min((to + 1.0) as usize)
 }
 
 /// `at` if it is below `count`; modulo `count` if periodic, else `None`.

@@ -16,11 +16,10 @@ const MOST_CLUSTERS: usize = 1 << 16;
 /// are those of the flattest ground. Cost: one evaluation of the surface per node.
 #[must_use]
 pub fn gaussian_ranks(surface: &dyn Surface) -> Vec<f64> {
-    let of_row = |row| {
-        let jets = surface.row_space_jets(row).into_iter();
-        jets.map(|jet| jet.mean_and_gaussian()[1].abs())
-    };
-    (0..surface.rows()).into_par_iter().flat_map_iter(of_row).collect()
+    let rows = (0..surface.rows()).into_par_iter();
+    rows.flat_map_iter(|row| surface.row_space_jets(row))
+        .map(|jet| jet.mean_and_gaussian()[1].abs())
+        .collect()
 }
 
 impl MetricField<'_> {

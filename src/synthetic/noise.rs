@@ -27,14 +27,19 @@ pub(super) fn gradient_noise<T: Scalar>(seed: u64, x: T, y: T) -> T {
     let (i, j) = (x.value().floor(), y.value().floor());
     let (u, v) = (x - i, y - j);
     let ramp = |di: f64, dj: f64| {
-        let draw = hash(hash(seed, (i + di) as i64 as u64), (j + dj) as i64 as u64);
-        let [gx, gy] = uniform_pair(draw).map(|g| 2.0 * g - 1.0);
+        let [gx, gy] = gradient_at(seed, i + di, j + dj);
         (u - di) * gx + (v - dj) * gy
     };
     let (su, sv) = (fade(u), fade(v));
     let south = mix(ramp(0.0, 0.0), ramp(1.0, 0.0), su);
     let north = mix(ramp(0.0, 1.0), ramp(1.0, 1.0), su);
     mix(south, north, sv)
+}
+
+/// The gradient of the noise at a whole-numbered point, from a square.
+fn gradient_at(seed: u64, x: f64, y: f64) -> [f64; 2] {
+    let draw = hash(hash(seed, x as i64 as u64), y as i64 as u64);
+    uniform_pair(draw).map(|g| 2.0 * g - 1.0)
 }
 
 /// `6t⁵ − 15t⁴ + 10t³`, from 0 to 1 with zero first and second derivatives at both ends.

@@ -97,6 +97,12 @@ impl NurbsGrid {
         self.origin()[axis] + at * self.steps()[axis]
     }
 
+    /// Whether the nodes of a column (`axis` 0) or a row (1) are all one point.
+    fn is_pole(&self, axis: usize, at: usize) -> bool {
+        let [least, most] = self.bounds[axis];
+        (at as f64) < least || at as f64 > most
+    }
+
     /// A jet by the surface's parameters as one by grid coordinates.
     fn by_nodes(&self, jet: SurfaceJet) -> SurfaceJet {
         let DVec2 { x, y } = self.steps();
@@ -125,11 +131,7 @@ impl Surface for NurbsGrid {
 
     /// Without the nodes of poles: they have no area, and the curvature of a tip would outweigh all else.
     fn measures(&self) -> Measures {
-        let is_pole = |axis: usize, at: usize| {
-            let [least, most] = self.bounds[axis];
-            (at as f64) < least || at as f64 > most
-        };
-        measured(self, |col, row| !is_pole(0, col) && !is_pole(1, row))
+        measured(self, |col, row| !self.is_pole(0, col) && !self.is_pole(1, row))
     }
 
     fn jet(&self, at: DVec2) -> Jet {

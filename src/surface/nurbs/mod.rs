@@ -231,14 +231,14 @@ impl NurbsSurface {
         let cols = self.knots[0].controls();
         self.knots[axis].domain().map(|u| {
             let basis = self.knots[axis].basis(u);
-            let at =
-                |k: usize, i: usize| self.net[if axis == 0 { k * cols + i } else { i * cols + k }];
-            let sum = |k: usize| {
-                (0..=self.knots[axis].degree())
-                    .map(|i| basis.of[i][0] * at(k, basis.first + i))
-                    .sum()
-            };
-            (0..self.knots[1 - axis].controls()).map(sum).collect()
+            // From one control point to the next along the direction, and along the edge.
+            let (step, along) = if axis == 0 { (1, cols) } else { (cols, 1) };
+            let control = |k: usize, i: usize| self.net[k * along + (basis.first + i) * step];
+            (0..self.knots[1 - axis].controls())
+                .map(|k| {
+                    (0..=self.knots[axis].degree()).map(|i| basis.of[i][0] * control(k, i)).sum()
+                })
+                .collect()
         })
     }
 
