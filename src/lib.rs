@@ -43,7 +43,7 @@
 //! * [`route`]: [`route::trace`] descends on `g` from the goal; a [`Route`] carries its numbers; [`Comparison`] sets several
 //!   metrics side by side.
 //! * [`region`]: [`region::Segmentation`] cuts a surface into regions of like shape; [`region::signatures`] and
-//!   [`region::matches`] find like ones on other surfaces.
+//!   [`region::match_regions`] find like ones on other surfaces.
 //! * [`export`], [`render`]: files and pictures.
 //!
 //! # Units, frames, signs
