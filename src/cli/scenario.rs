@@ -22,7 +22,7 @@ pub(crate) fn prepare(
     run: &RunArgs,
     control: &Control,
 ) -> Result<(Scenario, Terrain)> {
-    let metric = &ground.metric;
+    let metric = &ground.metric_options;
     let question = Question {
         dem: dem.to_owned(),
         starts: starts.to_vec(),
@@ -67,7 +67,7 @@ pub(crate) fn bind<'a>(
     run: &RunArgs,
     control: &Control,
 ) -> Result<MetricField<'a>> {
-    let metric = ground.metric.metric(metric, scenario.tensors())?;
+    let metric = ground.metric_options.metric(metric, scenario.tensors())?;
     let field = scenario.bind(&metric, control)?;
     if !run.quiet
         && let Some(level) = scenario.level_cost_dominated_by_climb(&field)
@@ -75,7 +75,7 @@ pub(crate) fn bind<'a>(
         eprintln!(
             "note: --climb-weight {} is more than 1000 times what level ground costs on the {} metric, {}: \
              distances come out far too short; 100 times would be {}",
-            ground.metric.climb_weight,
+            ground.metric_options.climb_weight,
             field.name(),
             digits(level),
             digits(100.0 * level)

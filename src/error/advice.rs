@@ -17,6 +17,8 @@ pub struct Advice {
 pub enum Remedy {
     /// Convert it to GeoTIFF.
     Convert,
+    /// Write it as GeoTIFF with the program that made it: no converter reads it.
+    Export,
     /// Convert its samples to 32-bit floating point.
     ConvertSamples,
     /// Compress it in a way that is read: by Deflate, without a predictor.
@@ -57,6 +59,7 @@ impl fmt::Display for Remedy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Convert => "convert it to GeoTIFF",
+            Self::Export => "write it as a GeoTIFF",
             Self::ConvertSamples => "convert its samples to 32-bit floating point",
             Self::Recompress => "compress it by Deflate without a predictor",
             Self::TakeBand => "take the band that holds heights",

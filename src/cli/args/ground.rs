@@ -17,7 +17,7 @@ pub(crate) struct GroundArgs {
     #[command(flatten)]
     pub(crate) fit: FitArgs,
     #[command(flatten)]
-    pub(crate) metric: MetricArgs,
+    pub(crate) metric_options: MetricArgs,
 }
 
 /// What surface to fit.

@@ -58,9 +58,9 @@ fn metrics(args: &CompareArgs) -> Result<Vec<NamedMetric>> {
     let mut metrics = args.metrics.clone();
     if metrics.is_empty() {
         metrics = ["isotropic", CURVATURE, "difference"].map(metric_named).into();
-        metrics.push(args.ground.metric.default_metric());
+        metrics.push(args.ground.metric_options.default_metric());
     }
-    args.ground.metric.check_tensor(&metrics)?;
+    args.ground.metric_options.check_tensor(&metrics)?;
     let mut once: Vec<NamedMetric> = Vec::new();
     for metric in metrics {
         if !once.iter().any(|other| other.name == metric.name) {

@@ -20,7 +20,7 @@ const ISOLINES: usize = 20;
 pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Result<()> {
     let outputs: Vec<_> = args.output.iter().chain(&args.labels).chain(&args.isolines).collect();
     check_distinct(&outputs)?;
-    if args.error && args.ground.metric.accuracy == AccuracyName::Fast {
+    if args.error && args.ground.metric_options.accuracy == AccuracyName::Fast {
         return Err(Failure::usage(
             "--error needs --accuracy high: only then the error is estimated",
         ));
@@ -31,7 +31,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     if let Some(path) = &args.isolines {
         check_file(path, &["geojson", "json"], args.overwrite, Some(&args.dem))?;
     }
-    let name = args.ground.metric.chosen(args.choice.metric)?;
+    let name = args.ground.metric_options.chosen(args.choice.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
     let (scenario, _) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = scenario::bind(&scenario, name, &args.ground, run, control)?;

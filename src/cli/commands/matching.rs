@@ -86,7 +86,7 @@ impl<'a> SegmentedSurface<'a> {
             false => open_dem(path, args, run, control)?,
         };
         let surface = source.surface();
-        let solver = args.ground.metric.solver();
+        let solver = args.ground.metric_options.solver();
         let mut levels = cut(surface, sampled, &args.regions, solver, control)?.levels;
         let level = levels.pop().unwrap_or_default();
         let signatures = signatures(surface, &level.labels, Neighbours::Surface, control)?;
@@ -137,14 +137,16 @@ impl<'a> SegmentedSurface<'a> {
 }
 
 fn open_nurbs(path: &Path, args: &MatchArgs, control: &Control) -> Result<(Source, SampledMetric)> {
-    if let Some(flag) = args.ground.metric.dem_only_flag() {
+    if let Some(flag) = args.ground.metric_options.dem_only_flag() {
         let name = path.display();
         return Err(Failure::usage(format!("{flag} is for DEMs, and {name} is none")));
     }
     let (cols, rows) = args.nodes;
     let surface = NurbsSurface::open(path)?.on_grid(cols, rows)?;
-    let metric =
-        args.ground.metric.metric(args.choice.metric.unwrap_or(metric_named(CURVATURE)), None)?;
+    let metric = args
+        .ground
+        .metric_options
+        .metric(args.choice.metric.unwrap_or(metric_named(CURVATURE)), None)?;
     let sampled =
         SampledMetric::of(&metric.on(&surface, &Modifiers::default(), control)?, control)?;
     Ok((Source::Nurbs(Box::new(surface)), sampled))
@@ -156,7 +158,7 @@ fn open_dem(
     run: &RunArgs,
     control: &Control,
 ) -> Result<(Source, SampledMetric)> {
-    let name = args.ground.metric.chosen(args.choice.metric)?;
+    let name = args.ground.metric_options.chosen(args.choice.metric)?;
     let places = (&[][..], &[][..]);
     let (scenario, terrain) = scenario::prepare(path, places, &args.ground, run, control)?;
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;

@@ -60,7 +60,7 @@ fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> R
 }
 
 fn routes(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
-    let name = args.ground.metric.chosen(args.metric)?;
+    let name = args.ground.metric_options.chosen(args.metric)?;
     let places = (&args.start[..], &args.goal[..]);
     let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let fields = [scenario::bind(&scenario, name, &args.ground, run, control)?];

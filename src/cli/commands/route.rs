@@ -19,7 +19,7 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
             check_file(path, &["geojson", "json", "gpx", "csv"], args.overwrite, Some(&args.dem))
         })
         .collect::<Result<Vec<_>>>()?;
-    let name = args.ground.metric.chosen(args.choice.metric)?;
+    let name = args.ground.metric_options.chosen(args.choice.metric)?;
     let places = (&args.start.start[..], &args.goal[..]);
     let (scenario, _) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let field = scenario::bind(&scenario, name, &args.ground, run, control)?;

@@ -30,13 +30,13 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
         .iter()
         .map(|path| check_file(path, &known, args.overwrite, Some(&args.dem)))
         .collect::<Result<Vec<_>>>()?;
-    let name = args.ground.metric.chosen(args.choice.metric)?;
+    let name = args.ground.metric_options.chosen(args.choice.metric)?;
     let places = (&[][..], &[][..]);
     let (scenario, terrain) = scenario::prepare(&args.dem, places, &args.ground, run, control)?;
     let relief = formats.iter().any(|format| format == "png").then_some(terrain);
     let metric = scenario::bind(&scenario, name, &args.ground, run, control)?;
     let sampled = SampledMetric::of(&metric, control)?;
-    let (regions, solver) = (&args.regions, args.ground.metric.solver());
+    let (regions, solver) = (&args.regions, args.ground.metric_options.solver());
     let segmentation = cut(&scenario.surface, sampled, regions, solver, control)?;
     let measures = measures(&segmentation, &scenario.surface, control)?;
     let result = Regions { scenario: &scenario, metric: &metric, segmentation, measures };

@@ -17,7 +17,7 @@ const MAGIC: [(&[u8], &str, Remedy); 11] = [
     (b"DSRB", "a Surfer grid, not read yet", Remedy::Convert),
     (b"\x89HDF", "an HDF5 or netCDF file, which is not read", Remedy::Convert),
     (b"CDF", "a netCDF file, which is not read", Remedy::Convert),
-    (b"\x93NUMPY", "a NumPy array, not read yet", Remedy::Convert),
+    (b"\x93NUMPY", "a NumPy array, not read yet", Remedy::Export),
 ];
 
 /// Extensions of DEMs that cannot be recognised by their content.
