@@ -23,7 +23,7 @@ impl DistanceMap {
     pub fn allocation(&self) -> Vec<Option<u32>> {
         let cols = self.cols();
         let mut labels = self.seed_labels();
-        let predecessors = predecessors(&self.field, &self.factors, self.corrected());
+        let predecessors = predecessors(&self.field, &self.factors, &self.corrected());
         let mut path = Vec::new();
         for first in 0..labels.len() {
             let mut at = first;

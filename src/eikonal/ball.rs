@@ -14,7 +14,7 @@ use super::schedule::active_set::Job;
 use super::schedule::memory::MemoryStore;
 use super::schedule::rounds::{End, Equation, Schedule};
 use super::schedule::stop::{Stop, is_final};
-use super::schedule::values::at_start;
+use super::schedule::tile_store::at_start;
 use super::solver::Solver;
 use super::source::{self, Seeds};
 use super::start::StartRegion;

@@ -5,27 +5,29 @@ use rayon::prelude::*;
 
 use super::factors::Factors;
 use super::predecessor;
+use super::schedule::memory::MemoryStore;
 use super::schedule::rounds::Statistics;
 use super::schedule::values::Values;
 use super::second_order::Correction;
 use super::start::StartRegion;
 use super::stencil::UNREACHED;
 use super::tensor_field::{TensorField, TensorTile};
-use super::tile::Limits;
-use crate::grid::tiling::AREA;
+use crate::error::Result;
+use crate::grid::tiling::{AREA, SIDE};
 use crate::metric::Unit;
 
 /// Distance from the nearest start region at every node.
+///
+/// Clones share the values. They are read from the store that the solve left them in, which for all solvers of this crate is memory; what a store of
+/// another kind cannot read counts as not reached until [`check`](Self::check) reports it.
 #[derive(Clone, Debug)]
 pub struct DistanceMap {
     pub(crate) field: TensorField,
     pub(super) factors: Factors,
-    /// First-order values.
+    /// First-order values, and what is known of each tile, for continuing the solve.
     pub(super) values: Values,
     /// What is to be added to them; `None` unless in high accuracy.
     pub(super) correction: Option<Correction>,
-    /// What is known of each tile, for continuing the solve.
-    pub(super) limits: Vec<Limits>,
     pub(super) starts: Box<[StartRegion]>,
     pub(super) statistics: Statistics,
 }
@@ -55,6 +57,16 @@ impl DistanceMap {
         self.statistics
     }
 
+    /// Whether all values that were asked for so far, of this map or of a clone, could be read. Routes and all else that returns a [`Result`] ask themselves;
+    /// ask after readers that return plain numbers, as [`at_node`](Self::at_node), [`to_row_major`](Self::to_row_major) or
+    /// [`allocation`](Self::allocation).
+    ///
+    /// # Errors
+    /// The first failure. None as long as values are in memory.
+    pub fn check(&self) -> Result<()> {
+        self.values.check()
+    }
+
     /// Memory that the map takes per node: tensors, values and, in high accuracy, two rounds of corrections.
     #[must_use]
     pub fn bytes_per_node(&self) -> usize {
@@ -65,7 +77,11 @@ impl DistanceMap {
     /// Distance at a node; infinite where not reached.
     #[must_use]
     pub fn at_node(&self, col: usize, row: usize) -> f64 {
-        let value = self.value(col, row);
+        self.distance(self.value(col, row))
+    }
+
+    /// A stored value in the unit of the map; infinite where not reached.
+    fn distance(&self, value: f32) -> f64 {
         if value < UNREACHED { f64::from(value) / self.field.root_scale() } else { f64::INFINITY }
     }
 
@@ -81,8 +97,24 @@ impl DistanceMap {
     /// Distances at all nodes, row-major from the north-west, infinite where not reached.
     #[must_use]
     pub fn to_row_major(&self) -> Vec<f32> {
-        let nodes = (0..self.rows()).flat_map(|row| (0..self.cols()).map(move |col| (col, row)));
-        nodes.map(|(col, row)| self.at_node(col, row) as f32).collect()
+        let mut distances = vec![0.0; self.cols() * self.rows()];
+        let lines = distances.chunks_exact_mut(self.cols().max(1));
+        lines.enumerate().for_each(|(row, line)| self.row(row, line));
+        distances
+    }
+
+    /// Fills a line with the distances of a row, from the west, infinite where not reached; in less time than
+    /// [`at_node`](Self::at_node) takes for one after the other.
+    pub fn row(&self, row: usize, line: &mut [f32]) {
+        let cols = self.cols().min(line.len());
+        for (i, line) in line[..cols].chunks_mut(SIDE).enumerate() {
+            let (tile, first) = self.field.tiling.place(i * SIDE, row);
+            let values = self.values.tile(tile);
+            for (place, distance) in (first..).zip(line) {
+                let value = values[place] + self.correction_at(tile, place);
+                *distance = self.distance(value) as f32;
+            }
+        }
     }
 
     /// Gradient of the distance at grid coordinates, in ground axes (x east, y north), per metre; `None` where
@@ -139,7 +171,7 @@ impl DistanceMap {
         predecessor::best_foot(&self.field, &self.factors, |c, r| self.value(c, r), col, row)
     }
 
-    /// A copy of the first-order values, if they have a correction, which must be updated where they change.
+    /// The first-order values, if they have a correction, which must be updated where they change.
     pub(super) fn values_if_corrected(&self) -> Option<Values> {
         self.correction.is_some().then(|| self.values.clone())
     }
@@ -155,20 +187,27 @@ impl DistanceMap {
     /// Value at a node in the field's stored units, corrected.
     pub(super) fn value(&self, col: usize, row: usize) -> f32 {
         let (tile, place) = self.field.tiling.place(col, row);
-        let correction = self.correction.as_ref().map_or(0.0, |all| all.at(tile, place));
-        self.values.tile(tile)[place] + correction
+        self.values.at(tile, place) + self.correction_at(tile, place)
     }
 
-    /// Values at all nodes in the field's stored units, corrected.
-    pub(super) fn corrected(&self) -> Values {
-        let mut values = self.values.clone();
-        let Some(correction) = &self.correction else { return values };
-        for tile in 0..self.field.tiling.tiles() {
-            for (place, value) in values.tile_mut(tile).iter_mut().enumerate() {
+    fn correction_at(&self, tile: usize, place: usize) -> f32 {
+        self.correction.as_ref().map_or(0.0, |all| all.at(tile, place))
+    }
+
+    /// Values of a tile in the field's stored units, corrected.
+    fn corrected_tile(&self, tile: usize) -> [f32; AREA] {
+        let mut values = self.values.copy_tile(tile);
+        if let Some(correction) = &self.correction {
+            for (place, value) in values.iter_mut().enumerate() {
                 *value += correction.at(tile, place);
             }
         }
         values
+    }
+
+    /// A copy of the values at all nodes in the field's stored units, corrected.
+    pub(super) fn corrected(&self) -> MemoryStore {
+        MemoryStore::filled(self.field.tiling, |tile| self.corrected_tile(tile))
     }
 
     pub(crate) fn stored(&self, col: usize, row: usize) -> f64 {
@@ -176,12 +215,15 @@ impl DistanceMap {
     }
 
     pub(crate) fn is_reached(&self, col: usize, row: usize) -> bool {
-        self.values.get(col, row) < UNREACHED
+        let (tile, place) = self.field.tiling.place(col, row);
+        self.values.at(tile, place) < UNREACHED
     }
 
     /// Stored value at a node, modulo the size of the grid where it is periodic; `None` outside and where not reached.
     pub(crate) fn reached(&self, col: isize, row: isize) -> Option<f64> {
         let (col, row) = self.field.tiling.node(col, row)?;
-        self.is_reached(col, row).then(|| self.stored(col, row))
+        let (tile, place) = self.field.tiling.place(col, row);
+        let value = self.values.at(tile, place);
+        (value < UNREACHED).then(|| (value + self.correction_at(tile, place)).into())
     }
 }

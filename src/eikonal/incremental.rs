@@ -10,10 +10,11 @@ use rayon::prelude::*;
 
 use super::distance_map::DistanceMap;
 use super::factors::Factors;
+use super::schedule::memory::MemoryStore;
 use super::schedule::rounds::{Equation, Statistics};
 use super::schedule::solution::{self, Changes, Solution};
 use super::schedule::stop::Stop;
-use super::schedule::values::Values;
+use super::schedule::values::{Values, count_reached};
 use super::solver::Solver;
 use super::source::{self, Seeds};
 use super::stencil::UNREACHED;
@@ -106,7 +107,10 @@ impl Solver {
         }
         let contested = contested(&map.values, &before);
         let uncorrected = map.values_if_corrected();
-        let lost = forget(&mut map, &changed);
+        let mut lost = masked(&map.values);
+        map.check()?;
+        let store = MemoryStore::continuing(map.values)?;
+        forget(&map.field, &store, &changed, &mut lost);
         let equation = Equation {
             field: &map.field,
             factors: &map.factors,
@@ -115,12 +119,11 @@ impl Solver {
         };
         // This converges: a tile is activated only after a node in it or next to it was forgotten, and no node is forgotten twice.
         let changes = Changes::Lost(&lost);
-        let left =
-            solution::solve(&equation, map.values, map.limits, changes, &Stop::Never, control)?;
-        let Solution { values, limits, statistics: forgetting } = left;
-        let map = DistanceMap { values, limits, ..map };
+        let left = solution::solve(&equation, store, changes, &Stop::Never, control)?;
+        let Solution { values, statistics: forgetting } = left;
+        let map = DistanceMap { values, ..map };
         let is_touched = |&(tile, reached): &(usize, usize)| {
-            lost[tile] < f32::INFINITY || count_reached(&map.values, tile) != reached
+            lost[tile] < f32::INFINITY || count_reached(&map.values.tile(tile)) != reached
         };
         if contested.iter().any(is_touched) {
             return self.solve_again(map, stop, control);
@@ -172,12 +175,13 @@ fn moved_seeds<'a>(
 /// The value of such a node jumps down from its start value, see [`ceiling`](super::tile::coefficients::ceiling). Where the metric is obtuse it may then support the very
 /// nodes that lowered it, so that forgetting what it came from would not be noticed.
 fn contested(values: &Values, seeds: &[Option<Box<Seeds>>]) -> Vec<(usize, usize)> {
-    let is_contested = |tile: &usize| {
-        let pairs = seeds[*tile].iter().flat_map(|seeds| seeds.iter()).zip(values.tile(*tile));
-        pairs.into_iter().any(|(&seed, &value)| seed < UNREACHED && value < seed)
+    let is_contested = |&tile: &usize| {
+        let Some(seeds) = &seeds[tile] else { return false };
+        let values = values.tile(tile);
+        seeds.iter().zip(&*values).any(|(&seed, &value)| seed < UNREACHED && value < seed)
     };
     let tiles = (0..seeds.len()).filter(is_contested).flat_map(|tile| around(values, tile));
-    tiles.map(|tile| (tile, count_reached(values, tile))).collect()
+    tiles.map(|tile| (tile, count_reached(&values.tile(tile)))).collect()
 }
 
 /// A tile and its neighbours.
@@ -185,20 +189,13 @@ fn around(values: &Values, tile: usize) -> impl Iterator<Item = usize> + '_ {
     std::iter::once(tile).chain(values.tiling().neighbours(tile).map(|(_, n)| n))
 }
 
-fn count_reached(values: &Values, tile: usize) -> usize {
-    values.tile(tile).iter().filter(|&&value| value < UNREACHED).count()
-}
-
-/// Forgets the values of these nodes. Returns for each tile the least of them, or of those that a stop masked.
-fn forget(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
-    let mut lost = masked(&map.values);
+/// Forgets the values of these nodes, and lowers what is `lost` in each tile to the least of them.
+fn forget(field: &TensorField, store: &MemoryStore, nodes: &[(usize, usize)], lost: &mut [f32]) {
     for &(tile, place) in nodes {
-        let value = &mut map.values.tile_mut(tile)[place];
-        lost[tile] = lost[tile].min(value.min(UNREACHED));
-        let open = map.field.tensors(tile).det[place] > 0.0;
-        *value = if open { UNREACHED } else { f32::INFINITY };
+        lost[tile] = lost[tile].min(store.values.at(tile, place).min(UNREACHED));
+        let open = field.tensors(tile).det[place] > 0.0;
+        store.values.set(tile, place, if open { UNREACHED } else { f32::INFINITY });
     }
-    lost
 }
 
 /// [`UNREACHED`] for each tile where a stopped solve masked a value from which another may have come (where the metric is obtuse, one end of
@@ -206,7 +203,7 @@ fn forget(map: &mut DistanceMap, nodes: &[(usize, usize)]) -> Vec<f32> {
 fn masked(values: &Values) -> Vec<f32> {
     let is_front = |tile: usize| {
         values.tile(tile).contains(&UNREACHED)
-            && around(values, tile).any(|tile| count_reached(values, tile) > 0)
+            && around(values, tile).any(|tile| count_reached(&values.tile(tile)) > 0)
     };
     let key = |tile| if is_front(tile) { UNREACHED } else { f32::INFINITY };
     (0..values.tiling().tiles()).into_par_iter().map(key).collect()

@@ -6,8 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::factors::Factors;
-use super::schedule::memory::SharedValues;
-use super::schedule::values::Values;
+use super::schedule::memory::MemoryStore;
 use super::stencil::UNREACHED;
 use super::stencil::foot;
 use super::stencil::ring::{RING, for_each_triangle, ring_of, rings, without_cut_corners};
@@ -40,9 +39,8 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 /// The predecessor of each node, row-major, as a place on its [`RING`]: of the two ends of the segment that
 /// its value came from, the one nearer to that point; the other, if only that is lower than the node. [`NOWHERE`]
 /// where not reached. Where a factor applies both may be higher than the node; the nearer one still leads to the start.
-pub(super) fn predecessors(field: &TensorField, factors: &Factors, values: Values) -> Vec<u8> {
+pub(super) fn predecessors(field: &TensorField, factors: &Factors, store: &MemoryStore) -> Vec<u8> {
     let tiling = field.tiling;
-    let values = SharedValues::new(values, f32::INFINITY);
     let mut predecessors = vec![NOWHERE; tiling.cols * tiling.rows];
     let bands = predecessors.par_chunks_mut((tiling.cols * SIDE).max(1)).enumerate();
     bands.for_each_init(Block::default, |block, (y, band)| {
@@ -50,7 +48,7 @@ pub(super) fn predecessors(field: &TensorField, factors: &Factors, values: Value
             let index = y * tiling.across + x;
             let factor = factors.of_tile(index).map(|factor| (factor, tiling.first(index)));
             let tile = Tile { tensors: field.tensors(index), factor, tolerance: 0.0, seeds: None };
-            values.read(index, block);
+            store.values.read(index, block);
             let [cols, _] = tiling.size(index);
             let found = simd::dispatch(TilePredecessors { block, tile: &tile });
             for (line, found) in band.chunks_mut(tiling.cols).zip(found) {
@@ -173,7 +171,7 @@ mod tests {
             let map = map.unwrap();
             let (mut reached, mut nearest) = (0, 0);
             for (node, predecessor) in
-                predecessors(&map.field, &map.factors, map.values.clone()).into_iter().enumerate()
+                predecessors(&map.field, &map.factors, &map.corrected()).into_iter().enumerate()
             {
                 let (col, row) = (node % map.cols(), node / map.cols());
                 if !map.is_reached(col, row) {

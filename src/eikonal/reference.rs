@@ -4,6 +4,8 @@ use glam::DVec2;
 
 use super::factors::Factors;
 use super::predecessor::best_foot;
+use super::schedule::memory::MemoryStore;
+use super::schedule::tile_store::TileStore;
 use super::schedule::values::Values;
 use super::start::StartRegion;
 use super::stencil::ring::RING;
@@ -25,7 +27,11 @@ const MOST_SWEEPS: usize = 2000;
 pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> Result<DistanceMap> {
     let factors = Factors::new(&field, starts);
     let seeds = source::seeds(&field, starts)?;
-    let mut values = Values::seeded(&field, &seeds);
+    let store = MemoryStore::seeded(&field, &seeds);
+    let value = |col, row| {
+        let (tile, place) = field.tiling.place(col, row);
+        store.values.at(tile, place)
+    };
     let (cols, rows) = (field.cols(), field.rows());
     let mut changed = true;
     let mut sweep = 0;
@@ -36,13 +42,13 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
             let row = if sweep & 2 == 0 { j } else { rows - 1 - j };
             for i in 0..cols {
                 let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
-                let old = values.get(col, row);
-                let new = best_foot(&field, &factors, |c, r| values.get(c, r), col, row)
-                    .map_or(f32::INFINITY, |(g, _)| g as f32);
                 let (tile, place) = field.tiling.place(col, row);
+                let old = store.values.at(tile, place);
+                let new = best_foot(&field, &factors, value, col, row)
+                    .map_or(f32::INFINITY, |(g, _)| g as f32);
                 let seed = seeds[tile].as_ref().map_or(f32::INFINITY, |seeds| seeds[place]);
                 if new < old.min(ceiling(seed, shortest(&field, col, row))) {
-                    values.lower(col, row, new);
+                    store.values.set(tile, place, new);
                     changed = true;
                 }
             }
@@ -56,12 +62,11 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
     let statistics = Statistics { sweeps: sweep, ..Statistics::default() };
     // Nothing is known of the margins, so that nothing counts as final.
     let unknown = Limits { margin: f32::MAX, longest_step: f32::MAX };
-    let limits = vec![unknown; field.tiling.tiles()];
+    (0..field.tiling.tiles()).try_for_each(|tile| store.set_limits(tile, &unknown))?;
     Ok(DistanceMap {
+        values: Values::new(field.tiling, store),
         field,
         factors,
-        values,
-        limits,
         correction: None,
         starts: starts.into(),
         statistics,

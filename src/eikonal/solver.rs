@@ -2,15 +2,15 @@
 
 use super::distance_map::DistanceMap;
 use super::factors::Factors;
+use super::schedule::memory::MemoryStore;
 use super::schedule::rounds::Equation;
 use super::schedule::solution::{self, Changes, Solution};
 use super::schedule::stop::Stop;
-use super::schedule::values::Values;
+use super::schedule::tile_store::TileStore;
 use super::second_order::{Correction, FirstOrder};
 use super::source::{self, Seeds};
 use super::start::StartRegion;
 use super::tensor_field::TensorField;
-use super::tile::Limits;
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::metric::MetricField;
@@ -75,15 +75,30 @@ impl Solver {
         stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
+        let store = |field: &_, seeds: &_| Ok(MemoryStore::seeded(field, seeds));
+        self.solve_in(store, field, starts, stop, control)
+    }
+
+    /// [`solve_field`](Self::solve_field) with values in a store, which `store` makes of the field and its start values, and for a second time if the first
+    /// solve does not converge.
+    ///
+    /// # Errors
+    /// Those of [`solve`](Self::solve) and of the store.
+    pub(super) fn solve_in<S: TileStore>(
+        &self,
+        store: impl Fn(&TensorField, &[Option<Box<Seeds>>]) -> Result<S>,
+        field: TensorField,
+        starts: &[StartRegion],
+        stop: &Stop,
+        control: &Control,
+    ) -> Result<DistanceMap> {
         stop.check()?;
         let seeds = source::seeds(&field, starts)?;
         let mut factors = Factors::new(&field, starts);
         let solve = |factors: &Factors| {
             let equation =
                 Equation { field: &field, factors, seeds: &seeds, tolerance: self.tolerance };
-            let values = Values::seeded(&field, &seeds);
-            let limits = vec![Limits::default(); field.tiling.tiles()];
-            solution::solve(&equation, values, limits, Changes::All, stop, control)
+            solution::solve(&equation, store(&field, &seeds)?, Changes::All, stop, control)
         };
         let solution = match solve(&factors) {
             Err(Error::NotConverged { .. }) if !factors.is_empty() => {
@@ -93,13 +108,12 @@ impl Solver {
             solution => solution?,
         };
         control.report("solving distance", 1.0);
-        let Solution { values, limits, statistics } = solution;
+        let Solution { values, statistics } = solution;
         let map = DistanceMap {
             field,
             factors,
             values,
             correction: None,
-            limits,
             starts: starts.into(),
             statistics,
         };
@@ -122,6 +136,7 @@ impl Solver {
             (Accuracy::High, None) => Some(Correction::new(&solution, control)?),
             (Accuracy::High, Some(before)) => Some(before.update(&solution, changed, control)?),
         };
+        map.check()?;
         Ok(map)
     }
 
@@ -148,15 +163,13 @@ impl Solver {
         stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
-        let DistanceMap { field, factors, values: before, limits, .. } = &map;
-        let mut values = before.clone();
-        values.seed(seeds);
+        let DistanceMap { field, factors, values: before, .. } = &map;
+        let store = MemoryStore::continuing(before.clone())?;
+        store.seed(seeds);
         let equation = Equation { field, factors, seeds, tolerance: self.tolerance };
         let changes = Changes::Since { before, edited };
-        match solution::solve(&equation, values, limits.clone(), changes, stop, control) {
-            Ok(Solution { values, limits, statistics }) => {
-                Ok(DistanceMap { values, limits, statistics, ..map })
-            }
+        match solution::solve(&equation, store, changes, stop, control) {
+            Ok(Solution { values, statistics }) => Ok(DistanceMap { values, statistics, ..map }),
             Err(Error::NotConverged { .. }) => self.solve_again(map, stop, control),
             Err(error) => Err(error),
         }

@@ -16,6 +16,7 @@ mod place;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 pub use self::advice::{Advice, Remedy};
 use self::mismatch::at_clause;
@@ -26,7 +27,7 @@ pub use self::place::{Obstacle, PlaceError, PlaceErrorKind, Role};
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// What can go wrong: in a file, in what the caller asked for, in the computation, on the machine.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A file contradicts its own format: cut short, damaged, or not what its name says.
@@ -94,7 +95,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// The cause.
-        source: io::Error,
+        source: Arc<io::Error>,
     },
     /// The work was cancelled through a [`CancelToken`](crate::CancelToken).
     #[error("cancelled")]
@@ -144,7 +145,7 @@ impl Error {
 
     /// An [`Error::Io`] for `path`.
     pub fn io(path: impl AsRef<Path>, source: io::Error) -> Self {
-        Self::Io { path: path.as_ref().to_path_buf(), source }
+        Self::Io { path: path.as_ref().to_path_buf(), source: Arc::new(source) }
     }
 
     /// Says where: for [`Error::Argument`] and [`Error::Format`]; the others stay as they are.

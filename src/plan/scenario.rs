@@ -167,7 +167,9 @@ impl Scenario {
         control: &Control,
     ) -> Result<DistanceMap> {
         let distance = self.question.solver.solve(field, &self.regions, stop, control)?;
-        match self.goals.iter().find(|goal| distance.at(goal.at).is_none()) {
+        let unreached = self.goals.iter().find(|goal| distance.at(goal.at).is_none());
+        distance.check()?;
+        match unreached {
             None => Ok(distance),
             Some(goal) => {
                 let is_reached = |col, row| distance.at_node(col, row).is_finite();

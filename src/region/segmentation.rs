@@ -165,6 +165,7 @@ impl Level {
             cover.seeds.iter().map(|&seed| node(seed, window.cols).into()).collect();
         let map = solver.solve_field(field, &starts, &Stop::Never, &control.quiet())?;
         let mut labels = map.allocation();
+        map.check()?;
         fill(&mut labels, &inside, window.cols);
         let first = self.regions.len() as u32;
         for &index in part {

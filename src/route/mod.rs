@@ -49,7 +49,9 @@ pub struct Route {
 /// quadratic form.
 pub fn trace(distance: &DistanceMap, metric: &MetricField<'_>, goal: DVec2) -> Result<Route> {
     metric.check_quadratic()?;
-    let grid = shortest(distance, goal, &|at| metric.grid_metric(at))?.ok_or_else(|| {
+    let line = shortest(distance, goal, &|at| metric.grid_metric(at))?;
+    distance.check()?;
+    let grid = line.ok_or_else(|| {
         let frame = metric.surface().frame();
         Error::NoPath {
             goal: frame.map_or(Location::Grid(goal), |frame| Location::Map(frame.to_map(goal))),

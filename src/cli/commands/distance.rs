@@ -57,6 +57,7 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
     }
     let written: String = outputs.iter().map(|path| wrote(path)).collect();
     let report = DistanceReport::new(&scenario, &field, &map, args.stats, provenance);
+    map.check()?;
     Report::new(text(&report, args.stats) + &written, report).print(run)
 }
 
@@ -66,9 +67,7 @@ fn write_map(
     georeference: &Georeference,
     map: &DistanceMap,
 ) -> Result<()> {
-    let distances = |row: usize, line: &mut [f32]| {
-        each_column(line, |col| map.at_node(col, row) as f32);
-    };
+    let distances = |row: usize, line: &mut [f32]| map.row(row, line);
     let azimuths = |row: usize, line: &mut [f32]| {
         each_column(line, |col| azimuth(map, col, row).unwrap_or(f32::NAN));
     };
@@ -105,6 +104,7 @@ fn isolines_file(
     provenance: &Provenance,
 ) -> Result<Vec<u8>> {
     let values = &map.to_row_major()[..];
+    map.check()?;
     let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let step = args.step.unwrap_or_else(|| round_step(largest.into(), ISOLINES));
     let frame = scenario.frame();

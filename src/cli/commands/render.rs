@@ -116,6 +116,7 @@ pub(super) fn map(
 /// About twenty isolines at round distances, and their step.
 fn equidistant(frame: &GridFrame, distance: &DistanceMap) -> ridgeway::Result<(f64, Vec<Isoline>)> {
     let values = distance.to_row_major();
+    distance.check()?;
     let largest = values.iter().filter(|v| v.is_finite()).fold(0f32, |a, &b| a.max(b));
     let step = round_step(largest.into(), ISOLINES);
     let levels = levels_by_step(&values, step)?;

@@ -1,12 +1,22 @@
 //! A tile store in memory, shared by all threads.
 
+use std::borrow::Cow;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-use super::tile_store::TileStore;
+use rayon::prelude::*;
+
+use super::tile_store::{TileReader, TileStore, at_start};
 use super::values::Values;
+use crate::eikonal::source::Seeds;
+use crate::eikonal::tensor_field::TensorField;
 use crate::eikonal::tile::{Block, Limits};
 use crate::error::Result;
 use crate::grid::tiling::{AREA, SIDE, Tiling};
+
+/// Fewest tiles that a thread fills. A small field is filled by one thread alone: waiting for another, it might take up other work of the
+/// pool that takes many times as long.
+const MIN_TILES: usize = 1024;
 
 /// A [`TileStore`] that holds all tiles in memory.
 #[derive(Debug)]
@@ -16,19 +26,51 @@ pub(crate) struct MemoryStore {
 }
 
 impl MemoryStore {
-    pub(crate) fn new(values: Values, limits: Vec<Limits>) -> Self {
-        Self {
-            values: SharedValues::new(values, f32::INFINITY),
-            limits: limits.into_iter().map(SharedLimits::new).collect(),
-        }
-    }
-
     /// A store whose values must be set before they are read. The system provides zeroed memory only as it is first written, so that this
     /// is cheap.
     pub(crate) fn unset(tiling: Tiling) -> Self {
         let nodes = bytemuck::zeroed_vec(tiling.tiles() * AREA);
         let limits = (0..tiling.tiles()).map(|_| SharedLimits::default()).collect();
         Self { values: SharedValues { tiling, nodes, outside: f32::INFINITY }, limits }
+    }
+
+    /// The start values; the rest unreached.
+    pub(crate) fn seeded(field: &TensorField, seeds: &[Option<Box<Seeds>>]) -> Self {
+        let start = |tile: usize| at_start(field.tensors(tile), seeds[tile].as_deref());
+        Self::filled(field.tiling, start)
+    }
+
+    /// What a solve left, to go on from: a copy, unless it is in memory and nobody else reads it.
+    ///
+    /// # Errors
+    /// Those of the store that the solve left it in.
+    pub(crate) fn continuing(values: Values) -> Result<Self> {
+        let tiling = values.tiling();
+        let (tiles, limits) = values.into_tiles()?;
+        let limits = limits.into_iter().map(SharedLimits::new).collect();
+        Ok(Self { values: SharedValues::new(tiling, tiles, f32::INFINITY), limits })
+    }
+
+    /// The given values of each tile.
+    pub(crate) fn filled(
+        tiling: Tiling,
+        values: impl Fn(usize) -> [f32; AREA] + Sync + Send,
+    ) -> Self {
+        let tiles = (0..tiling.tiles()).into_par_iter().with_min_len(MIN_TILES);
+        Self {
+            values: SharedValues::new(tiling, tiles.map(values).collect(), f32::INFINITY),
+            limits: (0..tiling.tiles()).map(|_| SharedLimits::default()).collect(),
+        }
+    }
+
+    /// Lowers values to those of the start.
+    pub(crate) fn seed(&self, seeds: &[Option<Box<Seeds>>]) {
+        for (tile, seeds) in seeds.iter().enumerate() {
+            let Some(seeds) = seeds else { continue };
+            for (place, &seed) in seeds.iter().enumerate() {
+                self.values.set(tile, place, seed.min(self.values.at(tile, place)));
+            }
+        }
     }
 
     /// What is known of a tile.
@@ -39,10 +81,6 @@ impl MemoryStore {
     /// Resets what is known of a tile.
     pub(crate) fn forget_limits(&self, tile: usize) {
         self.limits[tile].set(&Limits::default());
-    }
-
-    pub(crate) fn into_parts(self) -> (Values, Vec<Limits>) {
-        (self.values.into_values(), self.limits.iter().map(SharedLimits::get).collect())
     }
 }
 
@@ -69,6 +107,33 @@ impl TileStore for MemoryStore {
         self.limits[tile].set(limits);
         Ok(())
     }
+
+    fn into_reader(self) -> Arc<dyn TileReader> {
+        let limits = self.limits.iter().map(SharedLimits::get).collect();
+        Arc::new(TilesInMemory { tiles: self.values.into_tiles(), limits })
+    }
+}
+
+/// What a solve left in memory.
+#[derive(Clone, Debug)]
+struct TilesInMemory {
+    tiles: Vec<[f32; AREA]>,
+    limits: Vec<Limits>,
+}
+
+impl TileReader for TilesInMemory {
+    fn tile(&self, tile: usize) -> Result<Cow<'_, [f32]>> {
+        Ok(Cow::Borrowed(&self.tiles[tile]))
+    }
+
+    fn limits(&self, tile: usize) -> Result<Limits> {
+        Ok(self.limits[tile])
+    }
+
+    fn into_tiles(self: Arc<Self>, _: usize) -> Result<(Vec<[f32; AREA]>, Vec<Limits>)> {
+        let Self { tiles, limits } = Arc::unwrap_or_clone(self);
+        Ok((tiles, limits))
+    }
 }
 
 /// [`Limits`] as the bits of their numbers.
@@ -76,8 +141,10 @@ impl TileStore for MemoryStore {
 struct SharedLimits([AtomicU32; 2]);
 
 impl SharedLimits {
-    fn new(Limits { margin, longest_step }: Limits) -> Self {
-        Self([margin, longest_step].map(|limit| AtomicU32::new(limit.to_bits())))
+    fn new(limits: Limits) -> Self {
+        let shared = Self::default();
+        shared.set(&limits);
+        shared
     }
 
     fn get(&self) -> Limits {
@@ -107,20 +174,16 @@ pub(crate) struct SharedValues {
 }
 
 impl SharedValues {
-    pub(crate) fn new(values: Values, outside: f32) -> Self {
-        let tiling = values.tiling();
-        let nodes = values.into_tiles().into_flattened();
-        Self {
-            tiling,
-            outside,
-            nodes: nodes.into_iter().map(|value| AtomicU32::new(value.to_bits())).collect(),
-        }
+    pub(crate) fn new(tiling: Tiling, tiles: Vec<[f32; AREA]>, outside: f32) -> Self {
+        let nodes = tiles.into_flattened().into_iter();
+        let nodes = nodes.map(|value| AtomicU32::new(value.to_bits())).collect();
+        Self { tiling, nodes, outside }
     }
 
-    pub(crate) fn into_values(self) -> Values {
+    pub(crate) fn into_tiles(self) -> Vec<[f32; AREA]> {
         let nodes: Vec<f32> =
             self.nodes.into_iter().map(|bits| f32::from_bits(bits.into_inner())).collect();
-        Values::new(self.tiling, bytemuck::allocation::cast_vec(nodes))
+        bytemuck::allocation::cast_vec(nodes)
     }
 
     fn tile(&self, tile: usize) -> &[AtomicU32] {
@@ -129,6 +192,11 @@ impl SharedValues {
 
     pub(crate) fn at(&self, tile: usize, place: usize) -> f32 {
         f32::from_bits(self.tile(tile)[place].load(Relaxed))
+    }
+
+    /// Stores a value.
+    pub(crate) fn set(&self, tile: usize, place: usize, value: f32) {
+        self.tile(tile)[place].store(value.to_bits(), Relaxed);
     }
 
     /// The values of a tile and of the nodes around it.

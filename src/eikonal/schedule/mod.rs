@@ -9,11 +9,12 @@
 //! | file | answers |
 //! |---|---|
 //! | `tile_store` | where are values kept? a trait; `memory` is the first store |
+//! | `values` | who reads them later, and what if that fails? |
 //! | `active_set` | which tiles wait, and which are next? |
 //! | `rounds` | what happens in a round and after it? |
 //! | `stop` | when is it over? |
 //! | `worker_pool` | which thread does which job? |
-//! | `solution` | all of it in memory, from values to values |
+//! | `solution` | all of it, from the values that are given to those of the solution |
 //!
 //! Jeong and Whitaker, "A Fast Iterative Method for Eikonal Equations", SIAM J. Sci. Comput. 30 (2008).
 

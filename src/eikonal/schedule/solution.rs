@@ -1,14 +1,14 @@
-//! A solve in memory, from the values that are given to those of the solution.
+//! A solve, from the values that are given to those of the solution.
 
 use super::active_set::{ActiveSet, ITSELF};
-use super::memory::{MemoryStore, SharedValues};
 use super::rounds::{End, Equation, Schedule, Statistics};
 use super::stop::{self, Stop};
+use super::tile_store::TileStore;
 use super::values::Values;
 use crate::control::Control;
 use crate::eikonal::stencil::UNREACHED;
+use crate::eikonal::tile::BLOCK;
 use crate::eikonal::tile::kernel::Rule;
-use crate::eikonal::tile::{BLOCK, Limits};
 use crate::error::Result;
 use crate::grid::tiling::{SIDE, Tiling, opposite};
 
@@ -28,45 +28,47 @@ pub(crate) enum Changes<'a> {
 /// The result of a solve.
 #[derive(Debug)]
 pub(crate) struct Solution {
+    /// The values, with what is known of each tile, for going on later.
     pub(crate) values: Values,
-    /// What is known of each tile, for going on later.
-    pub(crate) limits: Vec<Limits>,
     pub(crate) statistics: Statistics,
 }
 
-/// Relaxes `values` to the solution of the discrete equation, starting from those that are `changes`, until `stop` is
-/// met. What is not final then is unreached. `limits` are those of the solution that the values are from.
+/// Relaxes the values in `store` to the solution of the discrete equation, starting from those that are `changes`, until `stop` is
+/// met. What is not final then is unreached. What the store knows of the tiles is of the solution that the values are from.
 ///
 /// # Errors
-/// [`Error::NotConverged`](crate::error::Error::NotConverged); cancelled.
-pub(crate) fn solve(
+/// [`Error::NotConverged`](crate::error::Error::NotConverged); those of the store; cancelled.
+pub(crate) fn solve<S: TileStore>(
     equation: &Equation<'_>,
-    values: Values,
-    limits: Vec<Limits>,
+    store: S,
     changes: Changes<'_>,
     stop: &Stop,
     control: &Control,
 ) -> Result<Solution> {
     let tiling = &equation.field.tiling;
-    let margin = limits.iter().fold(0f32, |most, limits| most.max(limits.margin));
-    let mut schedule = Schedule::new(MemoryStore::new(values, limits), tiling.tiles(), margin);
+    let margin = greatest_margin(&store, tiling)?;
+    let mut schedule = Schedule::new(store, tiling.tiles(), margin);
     match changes {
         Changes::All => schedule.activate_start(tiling, equation.seeds),
         Changes::Since { before, edited } => {
-            let Schedule { store, active, .. } = &mut schedule;
-            activate_front(tiling, before, &store.values, edited, active);
             schedule.reached = before.reached();
+            let Schedule { store, active, .. } = &mut schedule;
+            activate_front(tiling, before, store, edited, active)?;
         }
         Changes::Lost(keys) => activate_around(tiling, keys, &mut schedule.active),
     }
     let rule = if matches!(changes, Changes::Lost(_)) { Rule::Forget } else { Rule::Lower };
     let End { least_change, statistics } =
         schedule.run(equation, rule, stop, |_, _| (), control)?;
-    let (mut values, limits) = schedule.store.into_parts();
+    let store = schedule.store;
     if *stop != Stop::Never {
-        stop::mask(&mut values, equation.field, &limits, least_change, stop);
+        stop::mask(&store, equation.field, least_change, stop)?;
     }
-    Ok(Solution { values, limits, statistics })
+    Ok(Solution { values: Values::new(*tiling, store), statistics })
+}
+
+fn greatest_margin(store: &impl TileStore, tiling: &Tiling) -> Result<f32> {
+    (0..tiling.tiles()).try_fold(0f32, |most, tile| Ok(most.max(store.limits(tile)?.margin)))
 }
 
 /// Activates every tile whose key is finite, and its neighbours.
@@ -84,10 +86,10 @@ fn activate_around(tiling: &Tiling, keys: &[f32], active: &mut ActiveSet) {
 fn activate_front(
     tiling: &Tiling,
     before: &Values,
-    values: &SharedValues,
+    store: &impl TileStore,
     edited: &[f32],
     active: &mut ActiveSet,
-) {
+) -> Result<()> {
     let is_edited = |tile: usize| edited.get(tile).is_some_and(|&key| key < f32::INFINITY);
     let mut block = [[f32::INFINITY; BLOCK]; BLOCK];
     for tile in 0..tiling.tiles() {
@@ -96,7 +98,7 @@ fn activate_front(
         if !all && !before.contains(&UNREACHED) {
             continue;
         }
-        values.read(tile, &mut block);
+        store.read(tile, &mut block)?;
         let mut key = UNREACHED;
         for (rows, before) in block.windows(3).zip(before.chunks_exact(SIDE)) {
             let across: [f32; BLOCK] =
@@ -110,4 +112,5 @@ fn activate_front(
             active.activate(tile, key, ITSELF);
         }
     }
+    before.check()
 }

@@ -3,12 +3,11 @@
 use glam::DVec2;
 
 use super::tile_store::TileStore;
-use super::values::Values;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::tensor_field::TensorField;
-use crate::eikonal::tile::Limits;
+use crate::eikonal::tile::{BLOCK, Limits};
 use crate::error::{Error, Result};
-use crate::grid::tiling::AREA;
+use crate::grid::tiling::{AREA, SIDE};
 
 /// When to stop. With any of them, the distances that a map reports are final: the same, within the tolerance, as without stopping. All other
 /// nodes are unreached.
@@ -137,18 +136,25 @@ pub(crate) fn is_final(value: f32, limits: &Limits, least_change: f32) -> bool {
 
 /// Makes unreached all nodes whose values are not final given the changes left, or not to be reported.
 pub(crate) fn mask(
-    values: &mut Values,
+    store: &impl TileStore,
     field: &TensorField,
-    limits: &[Limits],
     least_change: f32,
     stop: &Stop,
-) {
+) -> Result<()> {
     let largest = stop.largest(field);
-    for (tile, limits) in limits.iter().enumerate() {
-        for value in values.tile_mut(tile).iter_mut().filter(|value| **value < UNREACHED) {
-            if *value > largest || !is_final(*value, limits, least_change) {
-                *value = UNREACHED;
-            }
+    let mut block = [[UNREACHED; BLOCK]; BLOCK];
+    for tile in 0..field.tiling.tiles() {
+        let limits = store.limits(tile)?;
+        let is_kept = |value| value <= largest && is_final(value, &limits, least_change);
+        store.read(tile, &mut block)?;
+        let nodes = block[1..=SIDE].iter_mut().flat_map(|line| &mut line[1..=SIDE]);
+        let mut is_changed = false;
+        for value in nodes.filter(|value| **value < UNREACHED && !is_kept(**value)) {
+            (*value, is_changed) = (UNREACHED, true);
+        }
+        if is_changed {
+            store.write(tile, &block)?;
         }
     }
+    Ok(())
 }

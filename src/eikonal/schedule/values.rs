@@ -1,85 +1,80 @@
-//! The values of all nodes, tile by tile.
+//! The values that a solve left, for all that reads them later.
 
-use rayon::prelude::*;
+use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
 
-use crate::eikonal::source::Seeds;
+use super::tile_store::{TileReader, TileStore};
 use crate::eikonal::stencil::UNREACHED;
-use crate::eikonal::tensor_field::{TensorField, TensorTile};
+use crate::eikonal::tile::Limits;
+use crate::error::{Error, Result};
 use crate::grid::tiling::{AREA, Tiling};
 
-/// Fewest tiles that a thread fills. A small field is filled by one thread alone: waiting for another, it might take up other work of the
-/// pool that takes many times as long.
-const MIN_TILES: usize = 1024;
-
-/// Values at the nodes, tile by tile, in the field's stored units: infinite where closed.
-#[derive(Clone, Debug, PartialEq)]
+/// Values at the nodes, in the field's stored units, where a solve left them. Clones share them.
+///
+/// A value that the store cannot read counts as unreached, so that reading one is not a matter of [`Result`] at every node. The first failure is
+/// remembered by all clones; what can fail asks for it by [`check`](Self::check) when it has read all it needs.
+#[derive(Clone, Debug)]
 pub(crate) struct Values {
     tiling: Tiling,
-    tiles: Vec<[f32; AREA]>,
+    reader: Arc<dyn TileReader>,
+    failure: Arc<OnceLock<Error>>,
 }
 
 impl Values {
-    pub(crate) fn new(tiling: Tiling, tiles: Vec<[f32; AREA]>) -> Self {
-        Self { tiling, tiles }
+    pub(crate) fn new(tiling: Tiling, store: impl TileStore) -> Self {
+        Self { tiling, reader: store.into_reader(), failure: Arc::default() }
     }
 
     pub(crate) fn tiling(&self) -> Tiling {
         self.tiling
     }
 
-    pub(crate) fn tile(&self, tile: usize) -> &[f32; AREA] {
-        &self.tiles[tile]
+    /// The value at a place of a tile.
+    pub(crate) fn at(&self, tile: usize, place: usize) -> f32 {
+        self.tile(tile)[place]
     }
 
-    pub(crate) fn tile_mut(&mut self, tile: usize) -> &mut [f32; AREA] {
-        &mut self.tiles[tile]
+    /// The values of a tile.
+    pub(crate) fn tile(&self, tile: usize) -> Cow<'_, [f32]> {
+        self.reader.tile(tile).unwrap_or_else(|error| {
+            self.failure.get_or_init(|| error);
+            Cow::Borrowed(&[UNREACHED; AREA])
+        })
     }
 
-    pub(crate) fn into_tiles(self) -> Vec<[f32; AREA]> {
-        self.tiles
+    /// A copy of the values of a tile.
+    pub(crate) fn copy_tile(&self, tile: usize) -> [f32; AREA] {
+        let mut copy = [0.0; AREA];
+        copy.copy_from_slice(&self.tile(tile));
+        copy
     }
 
-    /// The start values; the rest unreached.
-    pub(crate) fn seeded(field: &TensorField, seeds: &[Option<Box<Seeds>>]) -> Self {
-        let start = |tile: usize| at_start(field.tensors(tile), seeds[tile].as_deref());
-        let tiles =
-            (0..field.tiling.tiles()).into_par_iter().with_min_len(MIN_TILES).map(start).collect();
-        Self { tiling: field.tiling, tiles }
-    }
-
-    /// Lowers values to those of the start.
-    pub(crate) fn seed(&mut self, seeds: &[Option<Box<Seeds>>]) {
-        for (tile, seeds) in self.tiles.iter_mut().zip(seeds) {
-            seeds.iter().for_each(|seeds| lower(tile, seeds));
-        }
+    /// All tiles and what is known of each, as [`TileReader::into_tiles`].
+    pub(super) fn into_tiles(self) -> Result<(Vec<[f32; AREA]>, Vec<Limits>)> {
+        self.reader.into_tiles(self.tiling.tiles())
     }
 
     /// How many nodes have a value.
     pub(crate) fn reached(&self) -> usize {
-        self.tiles.as_flattened().iter().filter(|&&value| value < UNREACHED).count()
+        (0..self.tiling.tiles()).map(|tile| count_reached(&self.tile(tile))).sum()
     }
 
-    pub(crate) fn get(&self, col: usize, row: usize) -> f32 {
-        let (tile, place) = self.tiling.place(col, row);
-        self.tiles[tile][place]
-    }
-
-    pub(crate) fn lower(&mut self, col: usize, row: usize, value: f32) {
-        let (tile, place) = self.tiling.place(col, row);
-        let old = &mut self.tiles[tile][place];
-        *old = old.min(value);
+    /// # Errors
+    /// The first failure of the store, if there was any.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.failure.get().map_or(Ok(()), |error| Err(error.clone()))
     }
 }
 
-/// The values of a tile before the solve: those of the start, the rest unreached.
-pub(crate) fn at_start(tensors: &TensorTile, seeds: Option<&Seeds>) -> [f32; AREA] {
-    let mut values = tensors.det.map(|det| if det > 0.0 { UNREACHED } else { f32::INFINITY });
-    seeds.into_iter().for_each(|seeds| lower(&mut values, seeds));
-    values
+/// How many of these nodes have a value.
+pub(crate) fn count_reached(values: &[f32]) -> usize {
+    values.iter().filter(|&&value| value < UNREACHED).count()
 }
 
-fn lower(values: &mut [f32; AREA], seeds: &Seeds) {
-    for (value, seed) in values.iter_mut().zip(seeds) {
-        *value = value.min(*seed);
+#[cfg(test)]
+impl PartialEq for Values {
+    fn eq(&self, other: &Self) -> bool {
+        self.tiling == other.tiling
+            && (0..self.tiling.tiles()).all(|tile| self.tile(tile) == other.tile(tile))
     }
 }

@@ -41,7 +41,7 @@ impl<'a> Domain<'a> {
             solution,
             keys: (0..solution.field.tiling.tiles())
                 .into_par_iter()
-                .map(|tile| least_of(solution.values.tile(tile)))
+                .map(|tile| least_of(&solution.values.tile(tile)))
                 .collect(),
             // Reserved at once: moving feet when the vector grows would take longer than finding some.
             batches: Vec::with_capacity(batches),
@@ -125,7 +125,7 @@ impl<'a> Domain<'a> {
 }
 
 /// The least value of a tile.
-fn least_of(tile: &[f32; AREA]) -> f32 {
+fn least_of(tile: &[f32]) -> f32 {
     let mut lowest = [f32::INFINITY; SIDE];
     for row in tile.as_chunks::<SIDE>().0 {
         for i in 0..SIDE {

@@ -81,13 +81,13 @@ impl Surroundings {
         let part = (first, tiles);
         fill(&mut self.g, tiling, part, f32::INFINITY, |t| values.tile(t));
         match input.total {
-            Some(total) => fill(&mut self.e, tiling, part, 0.0, |t| &total[t]),
+            Some(total) => fill(&mut self.e, tiling, part, 0.0, |t| &total[t][..]),
             None => self.e.as_flattened_mut().fill(0.0),
         }
         let [xx, xy, det, _] = &mut self.metric;
-        fill(xx, tiling, part, 0.0, |t| &field.tensors(t).xx);
-        fill(xy, tiling, part, 0.0, |t| &field.tensors(t).xy);
-        fill(det, tiling, part, 0.0, |t| &field.tensors(t).det);
+        fill(xx, tiling, part, 0.0, |t| &field.tensors(t).xx[..]);
+        fill(xy, tiling, part, 0.0, |t| &field.tensors(t).xy[..]);
+        fill(det, tiling, part, 0.0, |t| &field.tensors(t).det[..]);
         simd::dispatch(Invert { metric: &mut self.metric });
         let again = input.total.is_some();
         for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {

@@ -1,7 +1,9 @@
 //! Tiles next to each other in a row, with the nodes around them.
 
+use std::ops::Deref;
+
 use crate::eikonal::stencil::ring::rings;
-use crate::grid::tiling::{AREA, SIDE, Tiling};
+use crate::grid::tiling::{SIDE, Tiling};
 use crate::linalg::lanes::{Lanes, lanes};
 
 /// Width of the halo: how many nodes beyond the tiles the functional reads.
@@ -15,12 +17,12 @@ pub(super) const BATCH: usize = 4;
 pub(super) type BatchBlock = [[f32; WIDTH]; HEIGHT];
 
 /// Fills the block of a batch of `tiles` tiles from `first` on and of its halo, with `outside` beyond the grid.
-pub(super) fn fill<'a>(
+pub(super) fn fill<T: Deref<Target = [f32]>>(
     batch: &mut BatchBlock,
     tiling: &Tiling,
     (first, tiles): (usize, usize),
     outside: f32,
-    values: impl Fn(usize) -> &'a [f32; AREA],
+    values: impl Fn(usize) -> T,
 ) {
     if tiling.is_over_seam(first, tiles, MARGIN) {
         return fill_over_seam(batch, tiling, first, outside, values);
@@ -35,7 +37,8 @@ pub(super) fn fill<'a>(
     for (dy, from, to) in rows {
         for k in 0..tiles + 2 {
             let Some(tile) = tiling.neighbour(first, k as isize - 1, dy) else { continue };
-            let lines = values(tile).as_chunks::<SIDE>().0[from.clone()].iter();
+            let values = values(tile);
+            let lines = values.as_chunks::<SIDE>().0[from.clone()].iter();
             let lines = lines.zip(&mut batch[to..]);
             if k == 0 {
                 lines.for_each(|(line, to)| to[..MARGIN].copy_from_slice(&line[SIDE - MARGIN..]));
@@ -51,17 +54,25 @@ pub(super) fn fill<'a>(
 }
 
 /// [`fill`] node by node.
-fn fill_over_seam<'a>(
+fn fill_over_seam<T: Deref<Target = [f32]>>(
     batch: &mut BatchBlock,
     tiling: &Tiling,
     first: usize,
     outside: f32,
-    values: impl Fn(usize) -> &'a [f32; AREA],
+    values: impl Fn(usize) -> T,
 ) {
+    // The tile of the node before, which is most nodes' own.
+    let mut last: Option<(usize, T)> = None;
     for (row, line) in (-(MARGIN as isize)..).zip(batch) {
         for (col, value) in (-(MARGIN as isize)..).zip(line) {
-            let place = tiling.seen_from(first, col, row);
-            *value = place.map_or(outside, |(tile, place)| values(tile)[place]);
+            *value = outside;
+            let Some((tile, place)) = tiling.seen_from(first, col, row) else { continue };
+            if last.as_ref().is_none_or(|&(before, _)| before != tile) {
+                last = Some((tile, values(tile)));
+            }
+            if let Some((_, values)) = &last {
+                *value = values[place];
+            }
         }
     }
 }

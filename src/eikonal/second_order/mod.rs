@@ -98,7 +98,7 @@ impl Correction {
         control.report("correcting distance", 1.0);
         let values = domain.solution.values;
         total.par_iter_mut().zip(&first).enumerate().for_each(|(tile, (total, first))| {
-            let values = values.tile(tile);
+            let values = &values.tile(tile)[..AREA];
             for i in 0..AREA {
                 // Not below −g: no distance is to be negative, also where the field is so rough that the transport does not converge.
                 total[i] = greatest(total[i] + first[i], -values[i]);

@@ -8,7 +8,6 @@ use std::slice;
 use super::super::schedule::active_set::{ActiveSet, ITSELF, Job};
 use super::super::schedule::memory::SharedValues;
 use super::super::schedule::rounds::WINDOW_CELLS;
-use super::super::schedule::values::Values;
 use super::super::schedule::worker_pool;
 use super::super::tile::transpose::transpose_block;
 use super::super::tile::{ALL, Block, LineMask};
@@ -54,7 +53,7 @@ pub(super) fn carry(
 ) -> Result<(Vec<[f32; AREA]>, Vec<usize>)> {
     let tiling = domain.solution.field.tiling;
     let tiles = tiling.tiles();
-    let e = SharedValues::new(Values::new(tiling, e), 0.0);
+    let e = SharedValues::new(tiling, e, 0.0);
     let work = |_: &mut (), job: u64| {
         let tile = Job::from_bits(job).tile as usize;
         let outcome = match domain.feet(tile) {
@@ -80,7 +79,7 @@ pub(super) fn carry(
         Ok(())
     };
     worker_pool::run(tiles, lead, work)?;
-    Ok((e.into_values().into_tiles(), leader.beyond))
+    Ok((e.into_tiles(), leader.beyond))
 }
 
 /// What happens between the rounds, on one thread.

@@ -119,7 +119,9 @@ fn reached(map: &DistanceMap) -> (usize, f64) {
 }
 
 fn reached_in_row(map: &DistanceMap, row: usize) -> (usize, f64) {
-    let values = (0..map.cols()).map(|col| f64::from(map.at_node(col, row) as f32));
+    let mut line = vec![0.0; map.cols()];
+    map.row(row, &mut line);
+    let values = line.into_iter().map(f64::from);
     values
         .filter(|value| value.is_finite())
         .fold((0, 0.0), |(count, largest), value| (count + 1, value.max(largest)))
