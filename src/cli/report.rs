@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 pub(crate) use ridgeway::export::{digits, metres};
-use ridgeway::{Error, Terrain, Unit};
+use ridgeway::{Error, Unit};
 use serde::Serialize;
 
 use crate::args::RunArgs;
@@ -50,10 +50,10 @@ pub(crate) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Prints on standard error what the reader of the DEM noticed.
-pub(crate) fn notes(terrain: &Terrain, run: &RunArgs) {
+/// Prints on standard error what the readers of files noticed.
+pub(crate) fn notes(notes: &[String], run: &RunArgs) {
     if !run.quiet {
-        terrain.notes().iter().for_each(|note| eprintln!("note: {note}"));
+        notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
 }
 

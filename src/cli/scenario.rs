@@ -36,13 +36,15 @@ pub(crate) fn prepare(
         tensors: metric.tensor.clone(),
     };
     let terrain = open(dem, run)?;
-    Ok((Scenario::on(&terrain, question, control)?, terrain))
+    let scenario = Scenario::on(&terrain, question, control)?;
+    report::notes(&scenario.notes, run);
+    Ok((scenario, terrain))
 }
 
 /// Reads the DEM and prints what its reader noticed.
 pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
     let terrain = Terrain::open(dem)?;
-    report::notes(&terrain, run);
+    report::notes(terrain.notes(), run);
     Ok(terrain)
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::geometry::read_geojson;
+use super::geometry::{read_geojson, touches};
 use super::place::Place;
 use super::question::Question;
 use super::rasters::{read_costs, read_tensors};
@@ -35,6 +35,8 @@ pub struct Scenario {
     pub starts: Vec<Site>,
     /// The points of the goals.
     pub goals: Vec<Site>,
+    /// What the user should know of the files that were read, such as a barrier that lies outside the grid.
+    pub notes: Vec<String>,
     barrier: Option<Arc<[bool]>>,
     tensors: Option<Arc<[Sym2]>>,
     cost: Option<Arc<[f32]>>,
@@ -59,7 +61,8 @@ impl Scenario {
     /// used; those of [`HeightSurface::fit`]; cancelled.
     pub fn on(terrain: &Terrain, question: Question, control: &Control) -> Result<Self> {
         let (frame, georeference) = (terrain.frame(), terrain.georeference());
-        let barrier = read_barriers(&question, georeference)?;
+        let mut notes = Vec::new();
+        let barrier = read_barriers(&question, georeference, &mut notes)?;
         let (start_shapes, starts) = locate(Role::Start, &question.starts, terrain)?;
         let (goal_shapes, goals) = locate(Role::Goal, &question.goals, terrain)?;
         for (goal, shapes) in question.goals.iter().zip(&goal_shapes) {
@@ -81,6 +84,7 @@ impl Scenario {
             regions: start_shapes.into_iter().map(StartRegion::from).collect(),
             starts,
             goals,
+            notes,
             barrier,
             tensors,
             cost,
@@ -237,11 +241,22 @@ impl Scenario {
     }
 }
 
-/// The cells that the barriers touch, row-major; `None` without barriers.
-fn read_barriers(question: &Question, georeference: &Georeference) -> Result<Option<Arc<[bool]>>> {
+/// The cells that the barriers touch, row-major; `None` without barriers. A file that touches none gets a note.
+fn read_barriers(
+    question: &Question,
+    georeference: &Georeference,
+    notes: &mut Vec<String>,
+) -> Result<Option<Arc<[bool]>>> {
     let mut cells: Option<Vec<bool>> = None;
     for path in &question.barriers {
-        let touched = rasterise(georeference.frame(), &read_geojson(path, georeference)?);
+        let shapes = read_geojson(path, georeference)?;
+        if !touches(&shapes, georeference) {
+            notes.push(format!(
+                "{}: the barrier lies outside the DEM and stops nothing",
+                path.display()
+            ));
+        }
+        let touched = rasterise(georeference.frame(), &shapes);
         match &mut cells {
             Some(cells) => cells.iter_mut().zip(touched).for_each(|(cell, more)| *cell |= more),
             None => cells = Some(touched),
@@ -375,5 +390,21 @@ mod tests {
         assert_eq!(json["accuracy"], "fast");
         assert_eq!(json["metrics"][0]["name"], "isotropic");
         assert!(json["metrics"][0]["delta_per_m"].is_null());
+    }
+
+    #[test]
+    fn a_barrier_outside_the_dem_gets_a_note() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("far.geojson");
+        std::fs::write(&path, r#"{"type":"LineString","coordinates":[[10,46],[10.1,46]]}"#)
+            .unwrap();
+        let crs = Crs::from_epsg(32632).unwrap();
+        let frame =
+            GridFrame::new(9, 5, DVec2::new(5e5, 5e6), DVec2::splat(10.0), crs.ground()).unwrap();
+        let terrain = Terrain::new(frame, vec![100.0; 45], crs).unwrap();
+        let mut question = Question::new("level.tif").from(Place::pixel(1.0, 1.0));
+        question.barriers.push(path);
+        let scenario = Scenario::on(&terrain, question, &Control::default()).unwrap();
+        assert!(scenario.notes[0].contains("outside the DEM"), "{:?}", scenario.notes);
     }
 }
