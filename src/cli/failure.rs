@@ -85,6 +85,7 @@ fn tool(remedy: Remedy) -> &'static str {
         Remedy::ReplaceWkt => ", which `gdalsrsinfo -o wkt1 EPSG:...` prints",
         Remedy::ScaleToMetres => ", for example with `gdal_calc.py`",
         Remedy::ResampleToDem => ", for example with `gdalwarp -te -ts`",
+        Remedy::ReprojectToDem => ", for example with `gdalwarp -t_srs -te -ts`",
         Remedy::Unpack => ", for example with `gunzip` or `unzip`",
         Remedy::FetchFromLfs => " with `git lfs pull`",
         _ => "",

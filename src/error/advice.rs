@@ -41,6 +41,8 @@ pub enum Remedy {
     ScaleToMetres,
     /// Resample it to the grid of the DEM.
     ResampleToDem,
+    /// Reproject it to the CRS of the DEM and resample it to its grid.
+    ReprojectToDem,
     /// Unpack it.
     Unpack,
     /// Fetch what a Git LFS pointer points to.
@@ -71,6 +73,7 @@ impl fmt::Display for Remedy {
             Self::ReplaceWkt => "replace it by the WKT 1 of its EPSG code",
             Self::ScaleToMetres => "scale the heights to metres",
             Self::ResampleToDem => "resample it to the grid of the DEM",
+            Self::ReprojectToDem => "reproject it to the CRS and the grid of the DEM",
             Self::Unpack => "unpack it first",
             Self::FetchFromLfs => "fetch what it points to",
         })

@@ -60,7 +60,7 @@ impl Scenario {
     /// [`Error::Place`] if a start or goal lies outside the terrain, on a void or on a barrier; a file that cannot be read or
     /// used; those of [`HeightSurface::fit`]; cancelled.
     pub fn on(terrain: &Terrain, question: Question, control: &Control) -> Result<Self> {
-        let (frame, georeference) = (terrain.frame(), terrain.georeference());
+        let georeference = terrain.georeference();
         let mut notes = Vec::new();
         let barrier = read_barriers(&question, georeference, &mut notes)?;
         let (start_shapes, starts) = locate(Role::Start, &question.starts, terrain)?;
@@ -74,8 +74,8 @@ impl Scenario {
             ground.check_touched(start, shapes)?;
         }
         let (tensors, cost) = (question.tensors.as_deref(), question.cost.as_deref());
-        let tensors = tensors.map(|path| read_tensors(path, frame)).transpose()?;
-        let cost = cost.map(|path| read_costs(path, frame)).transpose()?;
+        let tensors = tensors.map(|path| read_tensors(path, georeference)).transpose()?;
+        let cost = cost.map(|path| read_costs(path, georeference)).transpose()?;
         let surface = HeightSurface::fit(terrain, &question.fit, control)
             .map_err(|error| error.in_file(&question.dem))?;
         Ok(Self {
