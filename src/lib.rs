@@ -80,6 +80,7 @@ pub mod error;
 pub mod export;
 pub mod grid;
 pub mod linalg;
+mod memory;
 pub mod metric;
 #[cfg(feature = "plan")]
 pub mod plan;

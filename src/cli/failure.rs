@@ -52,6 +52,9 @@ impl Failure {
     }
 }
 
+/// What to do where memory is short.
+const SMALLER: &str = "; take a part of the DEM with `gdalwarp -te`, larger cells with `gdalwarp -tr`, or end other programs";
+
 impl From<Error> for Failure {
     /// What the library says, and what to do about it here.
     fn from(error: Error) -> Self {
@@ -63,6 +66,7 @@ impl From<Error> for Failure {
                 (WRONG_USE, "; give --overwrite to replace it")
             }
             Error::Io { source, .. } => (READING_OR_WRITING, advice(source.kind())),
+            Error::TooLarge { .. } => (WRONG_USE, SMALLER),
             Error::Place(place) => return Self::usage(refusal(place)),
             _ => (WRONG_USE, error.remedy().map_or("", tool)),
         };

@@ -13,6 +13,7 @@ use super::start::StartRegion;
 use super::tensor_field::TensorField;
 use crate::control::Control;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::metric::MetricField;
 
 /// Solves the eikonal equation.
@@ -41,6 +42,16 @@ pub enum Accuracy {
     High,
 }
 
+impl Accuracy {
+    /// About the most that a solve takes for a node, tensors included: peaks at 3000², less what there was before.
+    fn bytes_per_node(self) -> usize {
+        match self {
+            Self::Fast => 18,
+            Self::High => 34,
+        }
+    }
+}
+
 impl Default for Solver {
     fn default() -> Self {
         Self { tolerance: 1e-3, accuracy: Accuracy::default() }
@@ -52,8 +63,8 @@ impl Solver {
     /// included, at every node that can be reached before `stop`.
     ///
     /// # Errors
-    /// [`Error::Argument`] if no open node is at any start, or a number is out of range; [`Error::NotConverged`] if the tensors are
-    /// too extreme; [`Error::Cancelled`].
+    /// [`Error::Argument`] if no open node is at any start, or a number is out of range; [`Error::TooLarge`] if there is not memory enough;
+    /// [`Error::NotConverged`] if the tensors are too extreme; [`Error::Cancelled`].
     pub fn solve(
         &self,
         metric: &MetricField<'_>,
@@ -61,6 +72,12 @@ impl Solver {
         stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
+        let (cols, rows) = (metric.surface().cols(), metric.surface().rows());
+        let what = format!("a distance over {cols} × {rows} cells");
+        memory::check(
+            what,
+            memory::bytes(cols.saturating_mul(rows), self.accuracy.bytes_per_node()),
+        )?;
         self.solve_field(TensorField::sample(metric, control)?, starts, stop, control)
     }
 

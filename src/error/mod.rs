@@ -79,14 +79,14 @@ pub enum Error {
         /// A place where the distance still changed.
         at: Option<Location>,
     },
-    /// Something needs more memory than there is, or than is ever granted.
-    #[error("{what} needs {} of memory, {}", size(*bytes), limit_clause(*limit))]
+    /// Something needs more memory than there is.
+    #[error("{what} needs about {} of memory, {}", size(*bytes), limit_clause(*limit))]
     TooLarge {
         /// What needs it.
         what: String,
         /// How much of it, in bytes.
         bytes: u64,
-        /// The most that is granted, in bytes; `None` if the machine refused.
+        /// How much is available, in bytes; `None` if that is not known, but the machine refused.
         limit: Option<u64>,
     },
     /// Reading or writing failed.
@@ -228,7 +228,7 @@ fn nearest_clause(nearest: &Option<Location>) -> String {
 
 fn limit_clause(limit: Option<u64>) -> String {
     match limit {
-        Some(limit) => format!("more than the {} that is granted", size(limit)),
+        Some(limit) => format!("{} is available", size(limit)),
         None => "which this machine does not have".to_owned(),
     }
 }
@@ -303,8 +303,8 @@ mod tests {
         };
         assert_eq!(
             error(None),
-            "the raster needs 12.4 GB of memory, which this machine does not have"
+            "the raster needs about 12.4 GB of memory, which this machine does not have"
         );
-        assert!(error(Some(300_000_000)).ends_with("more than the 300.0 MB that is granted"));
+        assert!(error(Some(300_000_000)).ends_with("of memory, 300.0 MB is available"));
     }
 }

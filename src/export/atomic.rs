@@ -1,15 +1,22 @@
-//! Files that appear whole or not at all: written in the same folder under another name, then renamed.
+//! Files that appear whole or not at all: written in the same folder under another name, brought to the disk, then renamed.
+//!
+//! While its process lives, what is unfinished is locked. What a killed process left behind is not, and whoever writes into that
+//! folder next removes it.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempDir};
 
 use crate::error::{Error, Result};
 
 /// Where [`write_file`] lets its caller write; it can seek too.
 type Output = BufWriter<NamedTempFile>;
+
+/// What names of unfinished files and folders begin and end with.
+const PREFIX: &str = ".ridgeway-";
+const SUFFIX: &str = ".unfinished";
 
 /// Whether `path` may be written: call it before long work.
 ///
@@ -56,7 +63,7 @@ pub fn check_folder_free(folder: impl AsRef<Path>, names: &[&str], overwrite: bo
 }
 
 /// Writes the file `path` by `write`. Readers see the old content or the new one, never a part:
-/// the content goes to a temporary file in the same folder, which is renamed at the end and removed
+/// the content goes to a temporary file in the same folder, which is brought to the disk and renamed at the end, and removed
 /// if anything fails.
 ///
 /// # Errors
@@ -79,13 +86,17 @@ fn write_and_rename(
     overwrite: bool,
     write: impl FnOnce(&mut Output) -> io::Result<()>,
 ) -> io::Result<()> {
-    let mut out = BufWriter::new(temporary_file(parent(target))?);
+    let folder = parent(target);
+    remove_abandoned(folder);
+    let mut out = BufWriter::new(temporary_file(folder)?);
     write(&mut out)?;
     out.flush()?;
     let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    file.as_file().sync_all()?;
     if overwrite { file.persist(target) } else { file.persist_noclobber(target) }
-        .map(drop)
-        .map_err(|e| e.error)
+        .map_err(|e| e.error)?;
+    sync_folder(folder);
+    Ok(())
 }
 
 /// Fills the folder `path` by `fill`, which is given an empty temporary folder: next to it, and renamed into
@@ -102,16 +113,18 @@ pub fn write_folder(
     let path = path.as_ref();
     check_folder_free(path, &[], overwrite)?;
     let exists = path.is_dir();
-    let temporary = tempfile::Builder::new()
-        .prefix(".ridgeway-")
-        .tempdir_in(if exists { path } else { parent(path) })
-        .map_err(|e| Error::io(path, e))?;
+    let around = if exists { path } else { parent(path) };
+    remove_abandoned(around);
+    let (temporary, _lock) = temporary_folder(around).map_err(|e| Error::io(path, e))?;
     fill(temporary.path())?;
+    sync_files(temporary.path()).map_err(|e| Error::io(path, e))?;
     if exists {
-        move_files(temporary.path(), path, overwrite)
+        move_files(temporary.path(), path, overwrite)?;
     } else {
-        fs::rename(temporary.path(), path).map_err(|e| Error::io(path, e))
+        fs::rename(temporary.path(), path).map_err(|e| Error::io(path, e))?;
     }
+    sync_folder(around);
+    Ok(())
 }
 
 /// Moves the files of `from` into `to`, after checking that each may go there.
@@ -133,17 +146,70 @@ fn parent(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A temporary file with the permissions an ordinary new file has (a temporary file is private
+/// A locked temporary file with the permissions an ordinary new file has (a temporary file is private
 /// otherwise, and stays so when renamed).
 fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".ridgeway-");
+    builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    loop {
+        let file = builder.tempfile_in(folder)?;
+        // Some file systems have no locks: nobody removes anything there.
+        let _ = file.as_file().lock();
+        // Else it was taken for abandoned before it was locked.
+        if file.path().exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// A temporary folder, and what locks it, where the system can lock folders.
+fn temporary_folder(folder: &Path) -> io::Result<(TempDir, Option<File>)> {
+    loop {
+        let temporary =
+            tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).tempdir_in(folder)?;
+        let lock = File::open(temporary.path()).ok().filter(|lock| lock.lock().is_ok());
+        if temporary.path().exists() {
+            return Ok((temporary, lock));
+        }
+    }
+}
+
+/// Removes unfinished files and folders whose processes have ended. What cannot be removed, or not be locked, stays.
+fn remove_abandoned(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX)) {
+            continue;
+        }
+        let path = entry.path();
+        let Ok(lock) = File::open(&path) else { continue };
+        if lock.try_lock().is_ok() {
+            let _ = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+        }
+    }
+}
+
+/// Brings the files of a folder to the disk.
+fn sync_files(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        // Windows syncs what is open for writing only.
+        File::options().append(true).open(entry?.path())?.sync_all()?;
+    }
+    Ok(())
+}
+
+/// Brings the names of a folder to the disk, where the system can; the files are there already.
+fn sync_folder(folder: &Path) {
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
 }
 
 #[cfg(test)]
@@ -183,6 +249,22 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("a.txt: disk full"));
         assert_eq!(fs::read(&path).unwrap(), b"one");
         assert_eq!(entries(folder.path()), [PathBuf::from("a.txt")]);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_removed_and_what_is_locked_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, (out, _lock)) =
+            (temporary_file(folder.path()).unwrap(), temporary_folder(folder.path()).unwrap());
+        fs::write(folder.path().join(".ridgeway-abc.unfinished"), "half").unwrap();
+        fs::create_dir(folder.path().join(".ridgeway-def.unfinished")).unwrap();
+        fs::write(folder.path().join(".ridgeway-def.unfinished/map.png"), "half").unwrap();
+        fs::write(folder.path().join(".ridgeway-config"), "mine").unwrap();
+        write_file(folder.path().join("a.txt"), false, |out| out.write_all(b"one")).unwrap();
+        let mut left = [".ridgeway-config", "a.txt"].map(PathBuf::from).to_vec();
+        left.extend([file.path(), out.path()].map(|path| path.file_name().unwrap().into()));
+        left.sort();
+        assert_eq!(entries(folder.path()), left);
     }
 
     #[test]

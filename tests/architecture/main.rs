@@ -12,7 +12,7 @@ use source::{Import, Source};
 /// The folders and files of `src`, each after all that it may import from; those of one line know nothing of each other.
 const LAYERS: &[&[&str]] = &[
     &["error"],
-    &["control"],
+    &["control", "memory"],
     &["linalg"],
     &["grid"],
     &["terrain"],

@@ -21,6 +21,7 @@ use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
 use crate::linalg::simd;
+use crate::memory;
 use crate::terrain::Terrain;
 
 /// A smooth surface `z` over the grid of a terrain.
@@ -80,6 +81,8 @@ impl HeightSurface {
             }
             Smoothing::Tolerance(rms) => fewest_knots(&frame, heights, degree, rms, control)?,
         };
+        let what = format!("a surface over {} × {} cells", frame.cols(), frame.rows());
+        memory::check(what, fit_bytes(&frame, heights, &plan))?;
         let fit = fit_finite(&frame, heights, &plan, control)?;
         let residuals = residuals(&frame, &fit, heights);
         let mut voids = Vec::new();
@@ -253,6 +256,20 @@ impl Surface for HeightSurface {
             extent: (self.frame.mid_spacing() * cells).length(),
         }
     }
+}
+
+/// About what a fit takes beyond the heights: coefficients, with pointers to pieces of their rows; around voids also filled heights, and before
+/// that continuations of rows and columns with their weights.
+fn fit_bytes(frame: &GridFrame, heights: &[f64], plan: &FitPlan) -> u64 {
+    const COEFFICIENT: usize = 10;
+    const AROUND_VOIDS: usize = 26;
+    let coefficients = frame.rows() * (plan.intervals[0] + plan.degree);
+    let has_voids = heights.par_iter().any(|z| !z.is_finite());
+    let filled = if has_voids { memory::bytes(frame.nodes(), AROUND_VOIDS) } else { 0 };
+    filled.max(
+        memory::bytes(frame.nodes(), 8 * usize::from(has_voids))
+            + memory::bytes(coefficients, COEFFICIENT),
+    )
 }
 
 /// Derivatives per node `z_c, z_r, …` become those along east and north: `∂x = ∂c/Δx`, `∂y = −∂r/Δy`.

@@ -67,7 +67,7 @@ impl NurbsSurface {
     /// Reads a surface from a JSON file.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::TooLarge`] beyond 256 MiB; [`Error::Format`] if it is no JSON of this schema or no surface, see
+    /// [`Error::Io`]; [`Error::Format`] if it is longer than 256 MiB, no JSON of this schema or no surface, see
     /// [`new`](Self::new) and [`Knots`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
@@ -76,11 +76,8 @@ impl NurbsSurface {
         (&file).take(LONGEST + 1).read_to_end(&mut text).map_err(|e| Error::io(path, e))?;
         if text.len() as u64 > LONGEST {
             let length = file.metadata().map_or(LONGEST + 1, |metadata| metadata.len());
-            return Err(Error::TooLarge {
-                what: format!("the file {}", path.display()),
-                bytes: length,
-                limit: Some(LONGEST),
-            });
+            let expected = format!("at most {LONGEST} bytes");
+            return Err(Error::argument("the length of the file", length, expected).in_file(path));
         }
         if text.is_empty() {
             return Err(Error::argument("the file", "empty", "a surface in JSON").in_file(path));

@@ -10,6 +10,7 @@ use glam::DVec2;
 
 use super::format::{Format, Head, ReadMode};
 use crate::error::{Error, Location, Result};
+use crate::memory;
 use crate::terrain::raster::Raster;
 use crate::terrain::{Crs, Source};
 
@@ -188,6 +189,8 @@ fn cells<'a>(tokens: impl Iterator<Item = &'a [u8]>, grid: &Grid) -> Result<Vec<
         let expected = format!("{due}, that of {} × {} cells of the header", grid.cols, grid.rows);
         Error::argument("the number of heights", found, expected).advise(advice)
     };
+    let what = format!("a grid of {} × {} cells", grid.cols, grid.rows);
+    memory::check(what, memory::bytes(due, size_of::<f64>()))?;
     let mut heights = Vec::with_capacity(due);
     for token in tokens {
         let at = heights.len();

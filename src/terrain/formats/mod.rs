@@ -17,6 +17,7 @@ pub(super) use self::format::ReadMode;
 use self::format::{Format, Head};
 use super::raster::Raster;
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// All formats, in the order in which they are asked for a file: those that recognise theirs beyond doubt first.
 const FORMATS: [Format; 3] = [geotiff::FORMAT, ascii_grid::FORMAT, hgt::FORMAT];
@@ -32,11 +33,13 @@ pub(super) fn read(path: &Path, mode: ReadMode) -> Result<Raster> {
     let mut bytes = Vec::new();
     file.by_ref().take(Head::LENGTH).read_to_end(&mut bytes).map_err(io)?;
     let format = detect(path, &bytes)?;
+    let length = file.metadata().map_or(0, |metadata| metadata.len());
+    memory::check(format!("the file {}", path.display()), length)?;
     match file.read_to_end(&mut bytes) {
         Ok(_) => (format.read)(path, &bytes, mode),
         Err(e) if e.kind() == io::ErrorKind::OutOfMemory => Err(Error::TooLarge {
             what: format!("the file {}", path.display()),
-            bytes: file.metadata().map_or(0, |metadata| metadata.len()),
+            bytes: length,
             limit: None,
         }),
         Err(e) => Err(io(e)),

@@ -10,6 +10,7 @@ use super::predictor::Predictor;
 use super::sample::Sample;
 use super::tag;
 use crate::error::{Error, Remedy};
+use crate::memory;
 
 /// How the samples of one image are laid out in the file.
 pub(crate) struct Layout<'a> {
@@ -121,6 +122,8 @@ impl<'a> Layout<'a> {
     /// The samples of a band, row by row as stored; `NaN` where a chunk is absent.
     pub(crate) fn band(&self, band: usize) -> TiffResult<Vec<f64>> {
         let cells = self.cols * self.rows;
+        let what = format!("a band of {} × {} cells", self.cols, self.rows);
+        memory::check(what, memory::bytes(cells, size_of::<f64>()))?;
         // Only to see if there is room: zeroed memory costs nothing before it is used, and then the threads share the cost.
         if Vec::<f64>::new().try_reserve_exact(cells).is_err() {
             return Err(TiffError::TooLarge { bytes: (cells as u64).saturating_mul(8) });
