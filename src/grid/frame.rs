@@ -17,6 +17,8 @@
 //!   directions that leave the solver are in this frame, so `row` and `north` have opposite signs.
 //!
 //! Everything that measures asks [`GridFrame::spacing`], so a DEM in degrees is solved in metres.
+//!
+//! A grid of longitudes that goes all around is [periodic](GridFrame::is_periodic): after its last column comes the first again.
 
 use glam::DVec2;
 
@@ -82,6 +84,7 @@ pub struct GridFrame {
     origin: DVec2,
     step: DVec2,
     ground: Ground,
+    periodic: bool,
 }
 
 impl GridFrame {
@@ -93,7 +96,7 @@ impl GridFrame {
     ///
     /// # Errors
     /// [`Error::Argument`] if a count is 0 or absurd, a number is not finite, a step not positive, or an
-    /// ellipsoidal grid reaches beyond a pole.
+    /// ellipsoidal grid has nodes beyond a pole.
     pub fn new(
         cols: usize,
         rows: usize,
@@ -114,7 +117,8 @@ impl GridFrame {
         if !step.is_finite() || step.min_element() <= 0.0 {
             return Err(Error::argument("the cell size", step, "positive and finite"));
         }
-        let frame = Self { cols, rows, origin, step, ground };
+        let periodic = Self::columns_around(step.x, ground) == Some(cols);
+        let frame = Self { cols, rows, origin, step, ground, periodic };
         if let Ground::Ellipsoid { .. } = ground {
             let south = frame.to_map(DVec2::new(0.0, (rows - 1) as f64)).y;
             if origin.y > 90.0 || south < -90.0 {
@@ -123,6 +127,18 @@ impl GridFrame {
             }
         }
         Ok(frame)
+    }
+
+    /// How many columns of a width of `step` map units go once around the body; `None` on a plane, and if no whole number does.
+    #[must_use]
+    pub fn columns_around(step: f64, ground: Ground) -> Option<usize> {
+        /// Cells by which the end may miss the beginning: the width may be written with few digits.
+        const TOLERANCE: f64 = 0.1;
+        let cols = (360.0 / step).round();
+        let is_around = matches!(ground, Ground::Ellipsoid { .. })
+            && cols >= 3.0
+            && (cols * step - 360.0).abs() < TOLERANCE * step;
+        is_around.then_some(cols as usize)
     }
 
     /// Number of columns.
@@ -201,24 +217,42 @@ impl GridFrame {
         self.spacing(row) * DVec2::new(by.x, -by.y)
     }
 
-    /// Whether grid coordinates lie in the hull of the nodes, where the surface is defined.
+    /// Whether the columns go around the body, so that column [`cols`](Self::cols) is column 0 again.
+    #[must_use]
+    pub fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
+    /// Whether grid coordinates lie in the hull of the nodes, where the surface is defined. In a periodic direction all do.
     #[must_use]
     pub fn contains(&self, at: DVec2) -> bool {
-        let last = DVec2::new((self.cols - 1) as f64, (self.rows - 1) as f64);
-        at.cmpge(DVec2::ZERO).all() && at.cmple(last).all()
+        let at = self.in_first_turn(at);
+        at.is_finite() && at == self.clamp(at)
     }
 
     /// Whether grid coordinates lie on a cell of the raster: the hull of the nodes and half a cell more.
     #[must_use]
     pub fn is_on_cell(&self, at: DVec2) -> bool {
+        let at = self.in_first_turn(at);
         let last = DVec2::new(self.cols as f64 - 0.5, self.rows as f64 - 0.5);
         at.cmpge(DVec2::splat(-0.5)).all() && at.cmple(last).all()
     }
 
-    /// The nearest grid coordinates in the hull of the nodes.
+    /// The nearest grid coordinates in the hull of the nodes; in a periodic direction the same place on a cell of the raster.
     #[must_use]
     pub fn clamp(&self, at: DVec2) -> DVec2 {
-        at.clamp(DVec2::ZERO, DVec2::new((self.cols - 1) as f64, (self.rows - 1) as f64))
+        let last = DVec2::new((self.cols - 1) as f64, (self.rows - 1) as f64);
+        let inside = at.clamp(DVec2::ZERO, last);
+        if self.periodic { DVec2::new(self.in_first_turn(at).x, inside.y) } else { inside }
+    }
+
+    /// The same place with a column from −½ to less than `cols` − ½, if columns are periodic.
+    fn in_first_turn(&self, at: DVec2) -> DVec2 {
+        let within = at.x >= -0.5 && at.x < self.cols as f64 - 0.5;
+        if !self.periodic || within {
+            return at;
+        }
+        DVec2::new((at.x + 0.5).rem_euclid(self.cols as f64) - 0.5, at.y)
     }
 
     /// Index of node `(col, row)` in a row-major array.
@@ -257,6 +291,25 @@ mod tests {
         assert_eq!(frame.to_map(at), DVec2::new(100_067.5, 3_999_790.0));
         assert!((frame.to_grid(frame.to_map(at)) - at).length() < 1e-12);
         assert_eq!(frame.ground_vector(0.0, DVec2::new(1.0, 1.0)), DVec2::new(30.0, -60.0));
+    }
+
+    #[test]
+    fn a_grid_around_the_earth_is_periodic() {
+        let around = |cols, step: f64| {
+            GridFrame::new(cols, 3, DVec2::ZERO, DVec2::new(step, 1.0), Ground::WGS84).unwrap()
+        };
+        let globe = around(36, 10.0);
+        assert!(globe.is_periodic() && around(432, 0.833333).is_periodic());
+        for not in [around(35, 10.0), around(37, 10.0), around(2, 180.0), around(432, 0.82)] {
+            assert!(!not.is_periodic());
+        }
+        let at = DVec2::new(37.25, 1.0);
+        assert!(globe.contains(at) && globe.is_on_cell(at));
+        assert_eq!(globe.clamp(at), DVec2::new(1.25, 1.0));
+        assert_eq!(globe.clamp(DVec2::new(-0.75, 5.0)), DVec2::new(35.25, 2.0));
+        assert!(!globe.contains(DVec2::new(1.0, 3.0)) && !globe.contains(DVec2::NAN));
+        let plane = GridFrame::new(36, 3, DVec2::ZERO, DVec2::splat(10.0), Ground::METRES).unwrap();
+        assert!(!plane.is_periodic() && !plane.contains(at));
     }
 
     #[test]

@@ -83,8 +83,23 @@ impl Raster {
         if self.crs.is_none() {
             self.guess_crs();
         }
+        self.drop_repeated_columns();
         GridFrame::new(self.cols, self.rows, self.origin, self.step, self.crs.ground())
             .map_err(|e| e.in_file(path))
+    }
+
+    /// Drops columns beyond a full turn: grids of nodes around the Earth have the first meridian twice.
+    fn drop_repeated_columns(&mut self) {
+        let around = GridFrame::columns_around(self.step.x, self.crs.ground());
+        let Some(kept) = around.filter(|kept| *kept < self.cols) else { return };
+        for band in &mut self.bands {
+            *band = band.chunks_exact(self.cols).flat_map(|row| &row[..kept]).copied().collect();
+        }
+        let dropped = self.cols - kept;
+        self.cols = kept;
+        self.notes.push(format!(
+            "the columns of the file go more than once around; the last {dropped}, which repeat the first, were dropped"
+        ));
     }
 
     /// Without a CRS, coordinates that look like degrees are taken for degrees: taken for metres, every
@@ -130,6 +145,24 @@ fn reverse_rows(values: &mut [f64], cols: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_meridian_that_is_there_twice_is_dropped() {
+        let mut raster = Raster {
+            cols: 5,
+            rows: 2,
+            origin: DVec2::new(-180.0, 1.0),
+            step: DVec2::new(90.0, -1.0),
+            crs: Crs::from_epsg(4326).unwrap(),
+            bands: vec![vec![1.0, 2.0, 3.0, 4.0, 1.0, 5.0, 6.0, 7.0, 8.0, 5.0]],
+            source: Source::default(),
+            notes: Vec::new(),
+        };
+        let frame = raster.turn_north_up(Path::new("globe.tif")).unwrap();
+        assert!(frame.is_periodic() && frame.cols() == 4);
+        assert_eq!(raster.bands[0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+        assert!(raster.notes[0].contains("dropped"));
+    }
 
     #[test]
     fn rows_reverse() {

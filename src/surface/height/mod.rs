@@ -1,6 +1,7 @@
 //! The heightmap as a tensor-product B-spline `z(column, row)`.
 
 mod options;
+mod unrolled;
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -8,6 +9,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 pub use self::options::{Degree, FitOptions, Smoothing};
+use self::unrolled::Unrolled;
 use super::bspline::block::{BLOCK, HeightBlock};
 use super::bspline::fit::Fit;
 use super::bspline::knots::FitPlan;
@@ -28,13 +30,16 @@ use crate::terrain::Terrain;
 ///
 /// A tensor-product B-spline in grid coordinates; its derivatives are exact. They are taken along the
 /// ground axes at the spacing of the row, as on the plane: where meridians converge, second derivatives
-/// leave out a term of size `|∇z| tan(latitude)/R`, `R` the Earth's radius.
+/// leave out a term of size `|∇z| tan(latitude)/R`, `R` the Earth's radius. Where the grid goes around the Earth, so does the
+/// surface.
 #[derive(Clone, Debug)]
 pub struct HeightSurface {
     frame: GridFrame,
     /// Nodes per metre of each row, along and across it.
     per_metre: Vec<DVec2>,
     fit: Fit,
+    /// Columns of the fit before the first of the grid.
+    margin: usize,
     /// Row-major; empty if there are none.
     voids: Vec<bool>,
     residuals: Residuals,
@@ -70,28 +75,34 @@ impl HeightSurface {
         if !heights.iter().any(|z| z.is_finite()) {
             return Err(Error::argument("the number of heights that are not void", 0, "1 or more"));
         }
-        let cell = mean_cell(&frame);
-        let degree = options.degree.number();
-        let plan = match options.smoothing {
-            Smoothing::Interpolate => FitPlan::every_node(&frame, degree),
-            Smoothing::Cutoff(length) => FitPlan::smooth(&frame, degree, length),
-            Smoothing::CutoffCells(cells) => FitPlan::smooth(&frame, degree, cells * cell),
-            Smoothing::Auto => {
-                FitPlan::smooth(&frame, degree, cross_validate(&frame, heights, degree, control)?)
-            }
-            Smoothing::Tolerance(rms) => fewest_knots(&frame, heights, degree, rms, control)?,
-        };
-        let what = format!("a surface over {} × {} cells", frame.cols(), frame.rows());
-        memory::check(what, fit_bytes(&frame, heights, &plan))?;
-        let fit = fit_finite(&frame, heights, &plan, control)?;
+        if frame.is_periodic() {
+            let Unrolled { frame: wide, heights: mut repeated, margin } =
+                Unrolled::new(&frame, heights)?;
+            let (fit, cutoff) = fit_as_told(&wide, &repeated, options, control)?;
+            Unrolled::void_margins(&mut repeated, wide.cols(), margin);
+            let mut residuals = residuals(&wide, &fit, &repeated);
+            residuals.at.x -= margin as f64;
+            return Ok(Self::new(frame, heights, fit, margin, residuals, cutoff));
+        }
+        let (fit, cutoff) = fit_as_told(&frame, heights, options, control)?;
         let residuals = residuals(&frame, &fit, heights);
+        Ok(Self::new(frame, heights, fit, 0, residuals, cutoff))
+    }
+
+    fn new(
+        frame: GridFrame,
+        heights: &[f64],
+        fit: Fit,
+        margin: usize,
+        residuals: Residuals,
+        cutoff: Option<f64>,
+    ) -> Self {
         let mut voids = Vec::new();
         if !heights.par_iter().all(|z| z.is_finite()) {
             voids.extend(heights.iter().map(|z| !z.is_finite()));
         }
-        let cutoff = (plan.cutoff > 0.0).then_some(plan.cutoff);
         let per_metre = (0..frame.rows()).map(|row| frame.spacing(row as f64).recip()).collect();
-        Ok(Self { frame, per_metre, fit, voids, residuals, cutoff })
+        Self { frame, per_metre, fit, margin, voids, residuals, cutoff }
     }
 
     /// The grid of the terrain.
@@ -103,8 +114,13 @@ impl HeightSurface {
     /// Height in metres at grid coordinates, clamped to the hull of the nodes.
     #[must_use]
     pub fn height(&self, at: DVec2) -> f64 {
-        let [z] = self.fit.derivatives(self.frame.clamp(at), [[0, 0]]);
+        let [z] = self.derivatives(self.frame.clamp(at), [[0, 0]]);
         z
+    }
+
+    /// See [`Fit::derivatives`].
+    fn derivatives<const K: usize>(&self, at: DVec2, orders: [[usize; 2]; K]) -> [f64; K] {
+        self.fit.derivatives(at + DVec2::new(self.margin as f64, 0.0), orders)
     }
 
     /// Height and derivatives at grid coordinates, clamped to the hull of the nodes.
@@ -112,7 +128,7 @@ impl HeightSurface {
     pub fn jet(&self, at: DVec2) -> HeightJet {
         let at = self.frame.clamp(at);
         let orders = [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]];
-        ground_jet(self.frame.spacing(at.y).recip(), self.fit.derivatives(at, orders))
+        ground_jet(self.frame.spacing(at.y).recip(), self.derivatives(at, orders))
     }
 
     /// Third derivatives `[zxxx, zxxy, zxyy, zyyy]` in 1/m² along the ground axes at grid coordinates,
@@ -120,7 +136,7 @@ impl HeightSurface {
     #[must_use]
     pub fn third_derivatives(&self, at: DVec2) -> [f64; 4] {
         let at = self.frame.clamp(at);
-        let d = self.fit.derivatives(at, [[3, 0], [2, 1], [1, 2], [0, 3]]);
+        let d = self.derivatives(at, [[3, 0], [2, 1], [1, 2], [0, 3]]);
         let DVec2 { x, y } = self.frame.spacing(at.y).recip();
         [d[0] * x * x * x, -d[1] * x * x * y, d[2] * x * y * y, -d[3] * y * y * y]
     }
@@ -133,7 +149,7 @@ impl HeightSurface {
     pub fn row_jets(&self, row: usize, jets: &mut [HeightJet]) {
         let mut block = HeightBlock::default();
         for (i, jets) in jets[..self.frame.cols()].chunks_mut(BLOCK).enumerate() {
-            self.fit.jets(&self.per_metre, i * BLOCK, row..row + 1, &mut block);
+            self.fit.jets(&self.per_metre, self.margin + i * BLOCK, row..row + 1, &mut block);
             for (i, jet) in jets.iter_mut().enumerate() {
                 *jet = block.jet(0, i);
             }
@@ -184,13 +200,14 @@ impl HeightSurface {
         let (first, mut jets) = (band * BLOCK, HeightBlock::default());
         let (mut sums, mut count) = ([0.0; 2], 0);
         for col in (0..cols).step_by(BLOCK) {
-            self.fit.jets(&self.per_metre, col, first..rows.min(first + BLOCK), &mut jets);
+            let band = first..rows.min(first + BLOCK);
+            self.fit.jets(&self.per_metre, self.margin + col, band, &mut jets);
             let mut map_areas = [[0.0; BLOCK]; BLOCK];
             for (row, map_areas) in (first..rows).zip(&mut map_areas) {
                 let cell = share(row, rows, false) / self.per_metre[row].element_product();
                 for (col, map_area) in (col..cols).zip(map_areas) {
                     if !self.is_void(col, row) {
-                        *map_area = share(col, cols, false) * cell;
+                        *map_area = share(col, cols, self.frame.is_periodic()) * cell;
                         count += 1;
                     }
                 }
@@ -216,6 +233,10 @@ impl Surface for HeightSurface {
         Jet::Height(self.jet(at))
     }
 
+    fn periodic(&self) -> [bool; 2] {
+        [self.frame.is_periodic(), false]
+    }
+
     fn is_void(&self, col: usize, row: usize) -> bool {
         self.is_void(col, row)
     }
@@ -237,7 +258,7 @@ impl Surface for HeightSurface {
     }
 
     fn block_jets(&self, block: &Block, jets: &mut JetBlock) {
-        let (col, rows) = (block.cols.start, block.rows.clone());
+        let (col, rows) = (self.margin + block.cols.start, block.rows.clone());
         self.fit.jets(&self.per_metre, col, rows, jets.heights_mut());
     }
 
@@ -256,6 +277,30 @@ impl Surface for HeightSurface {
             extent: (self.frame.mid_spacing() * cells).length(),
         }
     }
+}
+
+/// The fit that the options ask for, and its cut-off wavelength in metres if it has one.
+fn fit_as_told(
+    frame: &GridFrame,
+    heights: &[f64],
+    options: &FitOptions,
+    control: &Control,
+) -> Result<(Fit, Option<f64>)> {
+    let cell = mean_cell(frame);
+    let degree = options.degree.number();
+    let plan = match options.smoothing {
+        Smoothing::Interpolate => FitPlan::every_node(frame, degree),
+        Smoothing::Cutoff(length) => FitPlan::smooth(frame, degree, length),
+        Smoothing::CutoffCells(cells) => FitPlan::smooth(frame, degree, cells * cell),
+        Smoothing::Auto => {
+            FitPlan::smooth(frame, degree, cross_validate(frame, heights, degree, control)?)
+        }
+        Smoothing::Tolerance(rms) => fewest_knots(frame, heights, degree, rms, control)?,
+    };
+    let what = format!("a surface over {} × {} cells", frame.cols(), frame.rows());
+    memory::check(what, fit_bytes(frame, heights, &plan))?;
+    let fit = fit_finite(frame, heights, &plan, control)?;
+    Ok((fit, (plan.cutoff > 0.0).then_some(plan.cutoff)))
 }
 
 /// About what a fit takes beyond the heights: coefficients, with pointers to pieces of their rows; around voids also filled heights, and before

@@ -483,3 +483,37 @@ fn impossible_wishes_are_refused() {
         HeightSurface::fit_heights(frame.clone(), &[0.0; 16], &FitOptions::default(), &control);
     assert!(matches!(cancelled, Err(Error::Cancelled)));
 }
+
+#[test]
+fn around_the_earth_no_meridian_is_special() {
+    // Heights turned by some columns give the surface turned by as many, also at the seam and with a void there.
+    let frame = |west: f64| {
+        let origin = DVec2::new(west, 40.0);
+        GridFrame::new(72, 12, origin, DVec2::splat(5.0), Ground::WGS84).unwrap()
+    };
+    let turned = 29;
+    let mut heights: Vec<f64> = noise(72 * 12).iter().map(|z| 1e3 * z).collect();
+    heights[5 * 72] = f64::NAN;
+    let others: Vec<f64> =
+        heights.chunks(72).flat_map(|row| [&row[turned..], &row[..turned]].concat()).collect();
+    for smoothing in [Smoothing::Interpolate, Smoothing::CutoffCells(6.0)] {
+        let surface = fit(&frame(-180.0), &heights, Degree::Cubic, smoothing);
+        let other = fit(&frame(-180.0 + 5.0 * turned as f64), &others, Degree::Cubic, smoothing);
+        assert_eq!(Surface::periodic(&surface), [true, false]);
+        let of_rows = [jets(&surface), jets(&other)];
+        for (i, a) in of_rows[0].iter().enumerate() {
+            let (col, row) = (i % 72, i / 72);
+            let b = of_rows[1][row * 72 + (col + 72 - turned) % 72];
+            assert!(
+                (a.z - b.z).abs() < 1e-3 && (a.zx - b.zx).abs() < 1e-8,
+                "{col} {row}: {a:?} {b:?}"
+            );
+            let by_turn = surface.jet(DVec2::new(col as f64 + 72.0, row as f64));
+            assert!((a.z - by_turn.z).abs() < 1e-9);
+        }
+        let (before, after) = (DVec2::new(71.4999, 3.0), DVec2::new(-0.5001, 3.0));
+        assert!((surface.height(before) - surface.height(after)).abs() < 1e-6);
+        assert!((surface.residuals().rms - other.residuals().rms).abs() < 1e-3);
+        assert!(surface.frame().contains(surface.residuals().at));
+    }
+}
