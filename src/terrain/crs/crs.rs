@@ -162,6 +162,14 @@ impl Crs {
         matches!(self.ground, Ground::Ellipsoid { .. })
     }
 
+    /// Whether it is a CRS of the Earth rather than of another body.
+    pub(super) fn is_on_earth(&self) -> bool {
+        self.projection.as_ref().is_none_or(|projection| {
+            let (a, _) = projection.proj.ellipse_parameters();
+            (a - 6_371_000.0).abs() < 20_000.0
+        })
+    }
+
     /// Whether nothing is known but that map coordinates are metres: [`Crs::none`].
     #[must_use]
     pub fn is_none(&self) -> bool {

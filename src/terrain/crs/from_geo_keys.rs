@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::crs::Crs;
+use super::from_wkt::datum_of_crs;
 use super::geo_keys::{GeoKeys, USER_DEFINED, key};
 use super::units::{length_unit, unit_name};
 use crate::error::{Error, Remedy, Result};
@@ -151,13 +152,6 @@ impl GeoKeys {
             [key::EASTING, key::NORTHING].map(|k| first(&k).unwrap_or(0.0) * metres_per_unit);
         Some(format!("{method} +lon_0={lon_0} +k={scale} +x_0={x_0} +y_0={y_0}"))
     }
-}
-
-/// The ellipsoid and datum shift of a geographic CRS in PROJ.4 notation, by its EPSG code.
-fn datum_of_crs(code: u16) -> Option<String> {
-    let definition = crs_definitions::from_code(code)?.proj4;
-    let rest = definition.strip_prefix("+proj=longlat ")?;
-    Some(rest.trim_end_matches("+no_defs").trim().to_owned())
 }
 
 #[cfg(test)]

@@ -220,7 +220,7 @@ fn crs_beside(path: &Path) -> Result<Crs> {
     for extension in ["prj", "PRJ"] {
         let beside = path.with_extension(extension);
         if let Ok(wkt) = fs::read(&beside) {
-            return Crs::from_wkt(&String::from_utf8_lossy(&wkt))
+            return Crs::from_text(&String::from_utf8_lossy(&wkt))
                 .map_err(|e| e.unsupported_in(&beside));
         }
     }
