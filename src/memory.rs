@@ -22,8 +22,9 @@ pub(crate) fn check(what: impl Into<String>, bytes: u64) -> Result<()> {
     if bytes < SMALL {
         return Ok(());
     }
+    let bytes = bytes.saturating_add(MARGIN);
     match available() {
-        Some(limit) if limit < bytes.saturating_add(MARGIN) => {
+        Some(limit) if limit < bytes => {
             Err(Error::TooLarge { what: what.into(), bytes, limit: Some(limit) })
         }
         _ => Ok(()),
@@ -136,7 +137,7 @@ mod tests {
         if available().is_some() {
             let message = check("a distance", 1 << 60).unwrap_err().to_string();
             assert!(
-                message.contains("a distance needs about 1152921504.6 GB of memory"),
+                message.contains("a distance needs about 1152921504.67 GB of memory, "),
                 "{message}"
             );
             assert!(message.contains("available"), "{message}");

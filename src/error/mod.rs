@@ -233,12 +233,12 @@ fn limit_clause(limit: Option<u64>) -> String {
     }
 }
 
-/// A number of bytes for people: `512 bytes`, `1.5 GB`.
+/// A number of bytes for people: `512 bytes`, `1.5 MB`, `1.50 GB`.
 fn size(bytes: u64) -> String {
     match bytes as f64 {
         b if b < 1e6 => format!("{bytes} bytes"),
         b if b < 1e9 => format!("{:.1} MB", b / 1e6),
-        b => format!("{:.1} GB", b / 1e9),
+        b => format!("{:.2} GB", b / 1e9),
     }
 }
 
@@ -303,7 +303,7 @@ mod tests {
         };
         assert_eq!(
             error(None),
-            "the raster needs about 12.4 GB of memory, which this machine does not have"
+            "the raster needs about 12.40 GB of memory, which this machine does not have"
         );
         assert!(error(Some(300_000_000)).ends_with("of memory, 300.0 MB is available"));
     }
