@@ -58,7 +58,7 @@ fn check_grid(path: &Path, raster: &RasterBands, dem: &Georeference) -> Result<(
         .in_file(path))
 }
 
-/// What `gdalwarp` takes behind `-ts` and `-te`.
+/// Size and extent: what programs that resample ask for.
 fn described(frame: &GridFrame) -> String {
     let ([west, south, east, north], (cols, rows)) = (frame.extent(), (frame.cols(), frame.rows()));
     format!("{cols} x {rows} cells over {west} {south} {east} {north} (west, south, east, north)")

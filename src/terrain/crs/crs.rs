@@ -162,6 +162,41 @@ impl Crs {
         matches!(self.ground, Ground::Ellipsoid { .. })
     }
 
+    /// The same map in a unit of `metres`; a code stands for its own unit only, so there is none if that is another.
+    pub(super) fn in_unit(self, metres: f64) -> Result<Self> {
+        let size = match self.ground {
+            Ground::Plane { metres_per_unit } => metres_per_unit,
+            Ground::WebMercator => 1.0,
+            Ground::Ellipsoid { .. } => return Ok(self),
+        };
+        if (size / metres - 1.0).abs() < 1e-7 {
+            return Ok(self);
+        }
+        let Some(projection) = &self.projection else {
+            return Ok(Self {
+                keys: self.keys,
+                ..Self::named(&self.name, &unit_name(metres), metres)
+            });
+        };
+        let of_unit = |parameter: &str| {
+            parameter.starts_with("+units=") || parameter.starts_with("+to_meter=")
+        };
+        let parameters = projection.definition.split_whitespace().filter(|p| !of_unit(p));
+        let mut definition = parameters.collect::<Vec<_>>().join(" ");
+        definition += &format!(" +to_meter={metres}");
+        Ok(Self {
+            caveat: self.caveat,
+            keys: self.keys,
+            ..Self::from_proj(&definition, &self.name)?
+        })
+    }
+
+    /// Whether map coordinates lead to longitude and latitude.
+    #[must_use]
+    pub fn has_lonlat(&self) -> bool {
+        self.projection.is_some()
+    }
+
     /// Whether it is a CRS of the Earth rather than of another body.
     pub(super) fn is_on_earth(&self) -> bool {
         self.projection.as_ref().is_none_or(|projection| {

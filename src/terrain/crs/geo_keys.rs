@@ -24,11 +24,14 @@ pub(in crate::terrain) mod key {
     pub(crate) const GEOGRAPHIC_CRS: u16 = 2048;
     pub(crate) const GEOGRAPHIC_CITATION: u16 = 2049;
     pub(crate) const GEODETIC_DATUM: u16 = 2050;
+    pub(crate) const PRIME_MERIDIAN: u16 = 2051;
     pub(crate) const ANGULAR_UNITS: u16 = 2054;
+    pub(crate) const ANGULAR_UNIT_SIZE: u16 = 2055;
     pub(crate) const ELLIPSOID: u16 = 2056;
     pub(crate) const SEMI_MAJOR: u16 = 2057;
     pub(crate) const SEMI_MINOR: u16 = 2058;
     pub(crate) const INVERSE_FLATTENING: u16 = 2059;
+    pub(crate) const PRIME_MERIDIAN_LON: u16 = 2061;
     pub(crate) const PROJECTED_CRS: u16 = 3072;
     pub(crate) const PROJECTED_CITATION: u16 = 3073;
     pub(crate) const METHOD: u16 = 3075;
@@ -46,6 +49,8 @@ pub(in crate::terrain) mod key {
     pub(crate) const NORTHING: [u16; 3] = [3083, 3087, 3091];
     /// Scale at natural origin or centre.
     pub(crate) const SCALE: [u16; 2] = [3092, 3093];
+    pub(crate) const AZIMUTH: u16 = 3094;
+    pub(crate) const RECTIFIED_GRID_ANGLE: u16 = 3096;
     pub(crate) const VERTICAL_CRS: u16 = 4096;
     pub(crate) const VERTICAL_UNITS: u16 = 4099;
 }

@@ -22,6 +22,25 @@ pub(in crate::terrain) fn length_unit(code: u16) -> Option<(&'static str, f64)> 
         9003 => ("US survey foot", 1200.0 / 3937.0),
         9005 => ("Clarke's foot", 0.304_797_265_4),
         9036 => ("kilometre", 1000.0),
+        9040 => ("British yard (Sears 1922)", 0.914_398_414_616_029),
+        9041 => ("British foot (Sears 1922)", 0.304_799_471_538_676),
+        9080 => ("Indian foot", 0.304_799_510_248_146_94),
+        9084 => ("Indian yard", 0.914_398_530_744_441),
+        9093 => ("statute mile", 1609.344),
+        9094 => ("Gold Coast foot", 0.304_799_710_181_509),
+        9096 => ("yard", 0.9144),
+        _ => return None,
+    })
+}
+
+/// Degrees of an EPSG unit of angle that numbers may be given in.
+pub(super) fn angle_unit(code: u16) -> Option<f64> {
+    Some(match code {
+        9101 => 1f64.to_degrees(),
+        9102 | 9122 => 1.0,
+        9103 => 1.0 / 60.0,
+        9104 => 1.0 / 3600.0,
+        9105 | 9106 => 0.9,
         _ => return None,
     })
 }
