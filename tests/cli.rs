@@ -125,6 +125,41 @@ fn info_tells_people_and_machines() {
 }
 
 #[test]
+fn a_crs_that_is_only_a_name_is_told() {
+    let folder = Folder::new();
+    let rows = "0 1 2 3 4 5\n".repeat(5);
+    folder.write(
+        "x.asc",
+        &format!("ncols 6\nnrows 5\nxllcorner 0\nyllcorner 0\ncellsize 30\n{rows}"),
+    );
+    folder.write("x.prj", r#"PROJCS["Our grid",UNIT["metre",1]]"#);
+    let told = folder.run("route x.asc --start pixel:1,1 --goal pixel:4,3 -o x.geojson");
+    assert!(
+        told.err.contains("note: of the CRS Our grid no more is known than its name"),
+        "{told:?}"
+    );
+    assert!(told.out.contains("wrote x.geojson in map coordinates"), "{told:?}");
+}
+
+#[test]
+fn a_dem_around_the_earth_has_no_edge() {
+    let folder = Folder::new();
+    let rows = format!("{}\n", "0 ".repeat(72)).repeat(9);
+    let header = "ncols 72\nnrows 9\nxllcorner -180\nyllcorner -22.5\ncellsize 5\n";
+    folder.write("globe.asc", &format!("{header}{rows}"));
+    folder.write("globe.prj", "+proj=longlat +datum=WGS84");
+    let places = "--start lonlat:175,0 --goal lonlat:-175,0 --goal lonlat:185,0";
+    let told = folder.run(&format!("distance globe.asc --metric isotropic {places}"));
+    // A degree along the equator measures 111.32 km.
+    assert_eq!(told.out.matches("1113 km").count(), 2, "{told:?}");
+    let told = folder.run(
+        "route globe.asc --metric isotropic --start lonlat:175,0 --goal lonlat:-175,0 -o r.geojson",
+    );
+    assert!(told.err.is_empty(), "{told:?}");
+    assert!(folder.read("r.geojson").contains("MultiLineString"));
+}
+
+#[test]
 fn maps_that_stretch_the_ground_are_told() {
     let folder = Folder::new();
     // Mercator maps double lengths at 60°; those of the web are corrected.

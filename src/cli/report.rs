@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 pub(crate) use ridgeway::export::{digits, metres};
+use ridgeway::terrain::Crs;
 use ridgeway::{Error, Unit};
 use serde::Serialize;
 
@@ -60,6 +61,18 @@ pub(crate) fn notes(notes: &[String], run: &RunArgs) {
 /// A line that names a written file.
 pub(crate) fn wrote(path: &Path) -> String {
     format!("wrote {}\n", path.display())
+}
+
+/// The same for a file on the map of `crs`: where that leads to no longitude and latitude, GeoJSON is in map coordinates.
+pub(crate) fn wrote_on(path: &Path, crs: &Crs) -> String {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let is_geojson = extension == "geojson" || extension == "json";
+    match is_geojson && !crs.has_lonlat() {
+        true => {
+            format!("wrote {} in map coordinates, not longitude and latitude\n", path.display())
+        }
+        false => wrote(path),
+    }
 }
 
 /// A line that names the files written into a folder.

@@ -25,6 +25,7 @@ pub(crate) fn prepare(
     let metric = &ground.metric_options;
     let question = Question {
         dem: dem.to_owned(),
+        height_unit: ground.fit.height_unit(),
         starts: starts.to_vec(),
         goals: goals.to_vec(),
         fit: ground.fit.options(),
@@ -35,15 +36,15 @@ pub(crate) fn prepare(
         cost: metric.cost.clone(),
         tensors: metric.tensor.clone(),
     };
-    let terrain = open(dem, run)?;
+    let terrain = open(dem, &ground.fit, run)?;
     let scenario = Scenario::on(&terrain, question, control)?;
     report::notes(&scenario.notes, run);
     Ok((scenario, terrain))
 }
 
 /// Reads the DEM and prints what its reader noticed.
-pub(crate) fn open(dem: &Path, run: &RunArgs) -> Result<Terrain> {
-    let terrain = Terrain::open(dem)?;
+pub(crate) fn open(dem: &Path, args: &FitArgs, run: &RunArgs) -> Result<Terrain> {
+    let terrain = Terrain::open_in(dem, args.height_unit())?;
     report::notes(terrain.notes(), run);
     Ok(terrain)
 }

@@ -5,12 +5,15 @@ use std::path::PathBuf;
 use super::place::Place;
 use crate::eikonal::Solver;
 use crate::surface::FitOptions;
+use crate::terrain::HeightUnit;
 
 /// A question as it is asked: nothing is read yet.
 #[derive(Clone, Debug, Default)]
 pub struct Question {
     /// The DEM.
     pub dem: PathBuf,
+    /// The unit of its heights, if that is known better than the file says it.
+    pub height_unit: Option<HeightUnit>,
     /// Where paths begin: the nearest start counts.
     pub starts: Vec<Place>,
     /// Where to go.

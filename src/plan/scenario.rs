@@ -48,7 +48,7 @@ impl Question {
     /// # Errors
     /// Those of [`Terrain::open`] and [`Scenario::on`].
     pub fn prepare(self, control: &Control) -> Result<Scenario> {
-        let terrain = Terrain::open(&self.dem)?;
+        let terrain = Terrain::open_in(&self.dem, self.height_unit)?;
         Scenario::on(&terrain, self, control)
     }
 }

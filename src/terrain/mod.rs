@@ -23,5 +23,5 @@ pub use self::crs::Crs;
 #[cfg(feature = "export")]
 pub(crate) use self::crs::GeoKeys;
 pub use self::georeference::Georeference;
-pub use self::raster::Source;
+pub use self::raster::{HeightUnit, Source};
 pub use self::terrain::Terrain;

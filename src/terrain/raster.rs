@@ -57,7 +57,77 @@ pub(super) struct Raster {
     pub(super) crs: Crs,
     pub(super) bands: Vec<Vec<f64>>,
     pub(super) source: Source,
+    /// Whether the file says the unit of the heights.
+    pub(super) says_height_unit: bool,
     pub(super) notes: Vec<String>,
+}
+
+/// A note if the lowest or the highest stored value stands so far off all others that it must mark voids.
+pub(super) fn note_of_fill(values: &[f64]) -> Option<String> {
+    /// Heights are beyond one of these before a look at the others is worth the time, and so far off the next.
+    const SUSPICIOUS: [f64; 2] = [-990.0, 9000.0];
+    const FAR: f64 = 1000.0;
+    /// Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
+    const DEEPEST: f64 = -12_000.0;
+    let [low, high] = extremes(values, [f64::INFINITY, f64::NEG_INFINITY]);
+    if low > SUSPICIOUS[0] && high < SUSPICIOUS[1] {
+        return None;
+    }
+    // Of the rest: the lowest and the highest that are neither.
+    let [next_low, next_high] = extremes(values, [low, high]);
+    let range = next_high - next_low;
+    let stands_off = |gap: f64| gap > range.max(FAR);
+    let fill = if low < DEEPEST
+        || low == -9999.0
+        || (low <= SUSPICIOUS[0] && stands_off(next_low - low))
+    {
+        low
+    } else if high >= SUSPICIOUS[1] && stands_off(high - next_high) {
+        high
+    } else {
+        return None;
+    };
+    Some(format!(
+        "some cells hold {fill}, which looks like a void that is not declared; \
+         declare it as the nodata value of the file"
+    ))
+}
+
+/// Lowest and highest of the values that are neither `NaN` nor one of two.
+fn extremes(values: &[f64], [low, high]: [f64; 2]) -> [f64; 2] {
+    const PART: usize = 1 << 14;
+    let of_part = |part: &[f64]| {
+        let counted = part.iter().filter(|&&v| v != low && v != high);
+        counted.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| {
+            [if v < a { v } else { a }, if v > b { v } else { b }]
+        })
+    };
+    values
+        .par_chunks(PART)
+        .map(of_part)
+        .reduce(|| [f64::INFINITY, f64::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])])
+}
+
+/// Unit that heights are stored in, where a file does not say it or is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeightUnit {
+    /// Metre.
+    Metre,
+    /// International foot, 0.3048 m.
+    Foot,
+    /// US survey foot, 1200/3937 m.
+    UsSurveyFoot,
+}
+
+impl HeightUnit {
+    /// Its name, and how many metres it is.
+    pub(super) fn describe(self) -> (&'static str, f64) {
+        match self {
+            Self::Metre => ("metre", 1.0),
+            Self::Foot => ("foot", 0.3048),
+            Self::UsSurveyFoot => ("US survey foot", 1200.0 / 3937.0),
+        }
+    }
 }
 
 impl Raster {
@@ -156,12 +226,28 @@ mod tests {
             crs: Crs::from_epsg(4326).unwrap(),
             bands: vec![vec![1.0, 2.0, 3.0, 4.0, 1.0, 5.0, 6.0, 7.0, 8.0, 5.0]],
             source: Source::default(),
+            says_height_unit: false,
             notes: Vec::new(),
         };
         let frame = raster.turn_north_up(Path::new("globe.tif")).unwrap();
         assert!(frame.is_periodic() && frame.cols() == 4);
         assert_eq!(raster.bands[0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
         assert!(raster.notes[0].contains("dropped"));
+    }
+
+    #[test]
+    fn fills_that_are_not_declared_are_noted() {
+        let ground: Vec<f64> = (0..500).map(f64::from).collect();
+        let with = |fill: f64| note_of_fill(&[&ground[..], &[fill, fill]].concat());
+        for fill in [32767.0, -32767.0, 65535.0, -9999.0, -999.0, 99999.0, 3.4e38, -3.4e38] {
+            assert!(with(fill).is_some_and(|note| note.contains(&fill.to_string())), "{fill}");
+        }
+        // The Dead Sea, Everest, a rover's Moon in half metres, the sea's floor.
+        let slope =
+            |low: i32, high: i32| note_of_fill(&(low..high).map(f64::from).collect::<Vec<_>>());
+        assert_eq!((with(-430.0), with(f64::NAN), slope(-430, 8849)), (None, None, None));
+        assert_eq!((slope(-18_000, 21_000).is_some(), slope(-11_000, 21_572)), (true, None));
+        assert_eq!(note_of_fill(&[]), None);
     }
 
     #[test]

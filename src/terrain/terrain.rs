@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::formats::{self, ReadMode};
-use super::raster::{Source, void_infinite};
+use super::raster::{HeightUnit, Source, void_infinite};
 use super::{Crs, Georeference};
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
@@ -52,9 +52,27 @@ impl Terrain {
     /// [`Error::Format`], [`Error::Unsupported`], [`Error::TooLarge`] or [`Error::Io`]: a file that is damaged, of a kind that
     /// is not read, or does not say how big its cells are on the ground; each says what to do.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_in(path, None)
+    }
+
+    /// The same where the unit of the stored heights is known better than the file says it.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_in(path: impl AsRef<Path>, unit: Option<HeightUnit>) -> Result<Self> {
         let path = path.as_ref();
         let mut raster = formats::read(path, ReadMode::Heights)?;
         let frame = raster.turn_north_up(path)?;
+        if let Some((name, metres)) = unit.map(HeightUnit::describe) {
+            raster.source.height_unit = name.to_owned();
+            raster.source.metres_per_height_unit = metres;
+        } else if !raster.says_height_unit && raster.crs.unit().contains("foot") {
+            raster.notes.push(format!(
+                "the map unit is the {}, but the file does not say the unit of the heights; \
+                 they are taken as metres",
+                raster.crs.unit()
+            ));
+        }
         let mut heights = raster.bands.swap_remove(0);
         let metres = raster.source.metres_per_height_unit;
         if metres != 1.0 {
@@ -65,6 +83,7 @@ impl Terrain {
         terrain.source = raster.source;
         terrain.notes.extend(terrain.note_of_heights());
         terrain.notes.extend(terrain.crs().caveat().map(str::to_owned));
+        terrain.notes.extend(terrain.note_of_unknown_projection());
         terrain.notes.extend(terrain.note_of_distortion());
         Ok(terrain)
     }
@@ -154,13 +173,27 @@ impl Terrain {
         }
     }
 
+    /// A note if a CRS has a name but no way to longitude and latitude.
+    fn note_of_unknown_projection(&self) -> Option<String> {
+        let crs = self.crs();
+        (!crs.is_none() && !crs.has_lonlat()).then(|| {
+            format!(
+                "of the CRS {} no more is known than its name and its unit, the {}: distances are those of the map, which \
+                 may be far from those on the ground, there is no way to longitude and latitude, and GeoJSON is written in \
+                 map coordinates; set a CRS that is known, or reproject the DEM to one",
+                crs.name(),
+                crs.unit()
+            )
+        })
+    }
+
     /// A note if lengths on the map, in which distances are measured, are not those on the ground.
     fn note_of_distortion(&self) -> Option<String> {
-        const NOTABLE: f64 = 0.01;
+        const NOTABLE: f64 = 0.004;
         let [least, most] = self.georeference.ground_per_map_metre()?;
         (least < 1.0 - NOTABLE || most > 1.0 + NOTABLE).then(|| {
             format!(
-                "a metre of this map is {least:.2} to {most:.2} m on the ground, and distances are those of the map; \
+                "a metre of this map is {least:.3} to {most:.3} m on the ground, and distances are those of the map; \
                  reproject the DEM to longitude and latitude or to the UTM zone for those of the ground"
             )
         })

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use ridgeway::metric::{MetricOptions, NAMED, NamedMetric};
+use ridgeway::terrain::HeightUnit;
 use ridgeway::{Accuracy, Degree, Delta, FitOptions, Metric, Smoothing, Solver, Sym2};
 
 use super::values::{OrAuto, delta, difference_delta, not_negative, positive, slope, smoothing};
@@ -24,6 +25,9 @@ pub(crate) struct GroundArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Surface")]
 pub(crate) struct FitArgs {
+    /// Unit of the stored heights, where the file does not say it or is wrong.
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub(crate) height_unit: Option<HeightUnitName>,
     /// Degree of the B-spline.
     #[arg(long, value_enum, default_value_t = DegreeName::Cubic)]
     pub(crate) degree: DegreeName,
@@ -45,6 +49,14 @@ pub(crate) struct FitArgs {
 }
 
 impl FitArgs {
+    pub(crate) fn height_unit(&self) -> Option<HeightUnit> {
+        self.height_unit.map(|name| match name {
+            HeightUnitName::M => HeightUnit::Metre,
+            HeightUnitName::Ft => HeightUnit::Foot,
+            HeightUnitName::UsFt => HeightUnit::UsSurveyFoot,
+        })
+    }
+
     pub(crate) fn options(&self) -> FitOptions {
         let smoothing = match (self.tolerance, self.smooth) {
             (Some(tolerance), _) => Smoothing::Tolerance(tolerance),
@@ -57,6 +69,16 @@ impl FitArgs {
         };
         FitOptions { degree, smoothing }
     }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum HeightUnitName {
+    /// Metres.
+    M,
+    /// International feet.
+    Ft,
+    /// US survey feet.
+    UsFt,
 }
 
 /// The one metric of a command.

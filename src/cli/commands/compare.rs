@@ -1,8 +1,11 @@
 //! `ridgeway compare`: one pair of places under several metrics.
 
+use std::path::Path;
+
 use ridgeway::export::routes_geojson;
 use ridgeway::metric::NamedMetric;
 use ridgeway::plan::{ComparisonReport, Scenario};
+use ridgeway::terrain::Crs;
 use ridgeway::{Comparison, Control, MetricField, Route, Terrain};
 
 use super::render;
@@ -10,7 +13,7 @@ use super::route::{HEADER, measures, profiles};
 use crate::args::{CURVATURE, CompareArgs, RunArgs, metric_named};
 use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
-use crate::report::{Report, Table, json, wrote_in};
+use crate::report::{Report, Table, json, wrote_in, wrote_on};
 use crate::scenario::{self, command_line};
 
 const FILES: [&str; 4] = ["routes.geojson", "profile.csv", "summary.json", "map.png"];
@@ -46,7 +49,7 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
         control.check()?;
         write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
-    let written = args.output.iter().map(|folder| wrote_in(folder, &FILES));
+    let written = args.output.iter().map(|folder| wrote_files(folder, scenario.georeference.crs()));
     Report::new(table + EXPLANATION + &written.collect::<String>(), report).print(run)
 }
 
@@ -68,6 +71,11 @@ fn metrics(args: &CompareArgs) -> Result<Vec<NamedMetric>> {
         }
     }
     Ok(once)
+}
+
+/// Lines that name the files: the first is GeoJSON.
+fn wrote_files(folder: &Path, crs: &Crs) -> String {
+    wrote_on(&folder.join(FILES[0]), crs) + &wrote_in(folder, &FILES[1..])
 }
 
 fn table(fields: &[MetricField<'_>], comparison: &Comparison) -> Table {

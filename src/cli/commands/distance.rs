@@ -11,7 +11,7 @@ use ridgeway::{Control, DistanceMap, Stop};
 use crate::args::{AccuracyName, DistanceArgs, RunArgs};
 use crate::failure::{Failure, Result};
 use crate::output::{check_distinct, check_file, write_content, write_raster};
-use crate::report::{Facts, Report, distance, wrote};
+use crate::report::{Facts, Report, distance, wrote_on};
 use crate::scenario::{self, command_line};
 
 /// Isolines that a map can carry, if the user names no step.
@@ -55,7 +55,8 @@ pub(super) fn run(args: &DistanceArgs, run: &RunArgs, control: &Control) -> Resu
         let bands = [("nearest start".into(), Samples::U32(&labels))];
         write_raster(path, args.overwrite, &scenario.georeference, &bands)?;
     }
-    let written: String = outputs.iter().map(|path| wrote(path)).collect();
+    let written: String =
+        outputs.iter().map(|path| wrote_on(path, scenario.georeference.crs())).collect();
     let report = DistanceReport::new(&scenario, &field, &map, args.stats, provenance);
     map.check()?;
     Report::new(text(&report, args.stats) + &written, report).print(run)

@@ -9,7 +9,7 @@ use crate::report::{Facts, Report, digits};
 use crate::scenario;
 
 pub(super) fn run(args: &InfoArgs, run: &RunArgs) -> Result<()> {
-    let terrain = scenario::open(&args.dem, run)?;
+    let terrain = scenario::open(&args.dem, &args.fit, run)?;
     let report = InfoReport::new(&args.dem, &terrain, &args.fit.options());
     let is_in_metres = terrain.crs().ground() == Ground::METRES;
     Report::new(text(&report, is_in_metres), report).print_always(run)

@@ -36,7 +36,7 @@ pub(super) fn run(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result
 }
 
 fn relief(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
-    let terrain = scenario::open(&args.dem, run)?;
+    let terrain = scenario::open(&args.dem, &args.ground.fit, run)?;
     let mut map = MapPicture::new(terrain.frame(), terrain.heights());
     map.title = title(&args.dem);
     map.max_side_px = args.width;
@@ -45,7 +45,7 @@ fn relief(args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>
 }
 
 fn field(layer: Layer, args: &RenderArgs, run: &RunArgs, control: &Control) -> Result<Vec<u8>> {
-    let terrain = scenario::open(&args.dem, run)?;
+    let terrain = scenario::open(&args.dem, &args.ground.fit, run)?;
     let surface = scenario::fit(&args.dem, &terrain, &args.ground.fit, control)?;
     let values = layer.sample(&surface);
     let gradient = match layer {

@@ -7,7 +7,7 @@ use ridgeway::{Control, Error, Route};
 use crate::args::{RouteArgs, RunArgs};
 use crate::failure::{Failure, Result};
 use crate::output::{check_distinct, check_file, write_content};
-use crate::report::{Report, Table, distance, metres, wrote};
+use crate::report::{Report, Table, distance, metres, wrote_on};
 use crate::scenario::{self, command_line};
 
 pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<()> {
@@ -36,7 +36,8 @@ pub(super) fn run(args: &RouteArgs, run: &RunArgs, control: &Control) -> Result<
     for (path, content) in args.output.iter().zip(&contents) {
         write_content(path, args.overwrite, content)?;
     }
-    let written: String = args.output.iter().map(|path| wrote(path)).collect();
+    let written: String =
+        args.output.iter().map(|path| wrote_on(path, scenario.georeference.crs())).collect();
     let text = table(&named).to_string() + &written;
     Report::new(text, RouteReport::new(&named, provenance)).print(run)
 }

@@ -16,7 +16,7 @@ use super::render::title;
 use crate::args::{RegionArgs, RunArgs, SegmentArgs};
 use crate::failure::Result;
 use crate::output::{check_distinct, check_file, write_content, write_raster};
-use crate::report::{Facts, Report, Table, digits, distance, wrote};
+use crate::report::{Facts, Report, Table, digits, distance, wrote_on};
 use crate::scenario::{self, command_line};
 
 /// Most regions of a level that the table names.
@@ -52,7 +52,8 @@ pub(super) fn run(args: &SegmentArgs, run: &RunArgs, control: &Control) -> Resul
             _ => write_content(path, args.overwrite, &result.polygons(&provenance)?)?,
         }
     }
-    let written: String = args.output.iter().map(|path| wrote(path)).collect();
+    let written: String =
+        args.output.iter().map(|path| wrote_on(path, scenario.georeference.crs())).collect();
     let report = SegmentReport {
         metric: metric.name().to_owned(),
         unit: metric.unit(),

@@ -16,7 +16,7 @@ pub(super) fn run(args: &SurfaceArgs, run: &RunArgs, control: &Control) -> Resul
     if let Some(output) = &args.output {
         check_file(output, &["tif", "tiff"], args.overwrite, Some(&args.dem))?;
     }
-    let terrain = scenario::open(&args.dem, run)?;
+    let terrain = scenario::open(&args.dem, &args.fit, run)?;
     let surface = scenario::fit(&args.dem, &terrain, &args.fit, control)?;
     if let Some(output) = &args.output {
         let make = |layer: Layer| {

@@ -8,10 +8,11 @@ use std::path::Path;
 
 use glam::DVec2;
 
+use super::auxiliary::Auxiliary;
 use super::format::{Format, Head, ReadMode};
 use crate::error::{Error, Location, Result};
 use crate::memory;
-use crate::terrain::raster::Raster;
+use crate::terrain::raster::{Raster, note_of_fill};
 use crate::terrain::{Crs, Source};
 
 pub(super) const FORMAT: Format =
@@ -26,8 +27,10 @@ fn begins_with_keyword(head: &Head) -> bool {
 }
 
 fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
-    let (header, grid, heights) = parse(bytes).map_err(|error| error.in_file(path))?;
-    let mut notes = Vec::new();
+    let beside = Auxiliary::beside(path);
+    let nodata = beside.nodata(0).and_then(|text| text.parse().ok());
+    let (header, grid, heights) = parse(bytes, nodata).map_err(|error| error.in_file(path))?;
+    let mut notes: Vec<String> = note_of_fill(&heights).into_iter().collect();
     if header.nodata.is_none() && heights.iter().any(|h| h.is_nan()) {
         notes.push(
             "the file has no NODATA_value line; cells of -9999 were taken as voids".to_owned(),
@@ -46,12 +49,13 @@ fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
             nodata: header.nodata.map(|v| v.to_string()),
             ..Source::default()
         },
+        says_height_unit: false,
         notes,
     })
 }
 
-/// The header, the grid it describes, and the cells.
-fn parse(bytes: &[u8]) -> Result<(Header, Grid, Vec<f64>)> {
+/// The header, the grid it describes, and the cells; a nodata value that is given goes before that of the header.
+fn parse(bytes: &[u8], nodata: Option<f64>) -> Result<(Header, Grid, Vec<f64>)> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut tokens = bytes.split(u8::is_ascii_whitespace).filter(|t| !t.is_empty()).peekable();
     let mut header = Header::default();
@@ -65,6 +69,7 @@ fn parse(bytes: &[u8]) -> Result<(Header, Grid, Vec<f64>)> {
         })?;
         header.set(&word, value)?;
     }
+    header.nodata = nodata.or(header.nodata);
     let grid = header.check(bytes.len())?;
     let heights = cells(tokens, &grid)?;
     Ok((header, grid, heights))
@@ -201,7 +206,9 @@ fn cells<'a>(tokens: impl Iterator<Item = &'a [u8]>, grid: &Grid) -> Result<Vec<
             Error::argument("the height", quoted(token), "a number")
                 .at(Location::Node { col: at % grid.cols, row: at / grid.cols })
         })?;
-        heights.push(if height == grid.nodata { f64::NAN } else { height });
+        // Writers hold heights as `f32`, and print the nodata value of the header and of the cells with other digits.
+        let is_void = height == grid.nodata || height as f32 == grid.nodata as f32;
+        heights.push(if is_void { f64::NAN } else { height });
     }
     if heights.len() < due {
         return Err(wrong_count(heights.len().to_string(), "the file is cut short"));
@@ -258,6 +265,13 @@ mod tests {
         assert_eq!(raster.step, DVec2::new(1.5, -2.0));
         assert_eq!(raster.bands[0][..3], [1.5, 20.0, 3.0]);
         assert!(raster.bands[0][3].is_nan() && raster.bands[0][4].is_nan());
+    }
+
+    #[test]
+    fn nodata_is_compared_as_single_precision() {
+        let header = format!("{HEADER}NODATA_value -3.4028234663852886e+38\n");
+        let raster = read(&format!("{header}1 2 3 4 5 -3.4028235e+38")).unwrap();
+        assert!(raster.bands[0][5].is_nan() && raster.bands[0][4] == 5.0);
     }
 
     #[test]

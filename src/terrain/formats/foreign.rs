@@ -6,7 +6,7 @@ use super::format::Head;
 use crate::error::{Error, Remedy, Result};
 
 /// The first bytes of a file, what it is, and what to do with it.
-const MAGIC: [(&[u8], &str, Remedy); 11] = [
+const MAGIC: [(&[u8], &str, Remedy); 13] = [
     (b"\x1f\x8b", "a gzip file", Remedy::Unpack),
     (b"PK\x03\x04", "a zip archive", Remedy::Unpack),
     (b"\x89PNG", "a picture (PNG), not read yet", Remedy::Convert),
@@ -17,6 +17,8 @@ const MAGIC: [(&[u8], &str, Remedy); 11] = [
     (b"DSRB", "a Surfer grid, not read yet", Remedy::Convert),
     (b"\x89HDF", "an HDF5 or netCDF file, which is not read", Remedy::Convert),
     (b"CDF", "a netCDF file, which is not read", Remedy::Convert),
+    (b"UHL1", "a DTED file, which is not read", Remedy::Convert),
+    (b"Lerc2 ", "a LERC file, which is not read", Remedy::Convert),
     (b"\x93NUMPY", "a NumPy array, not read yet", Remedy::Export),
 ];
 

@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::auxiliary::Auxiliary;
 use super::format::{Format, ReadMode};
 use super::tiff::{
     Directory, Layout, Sample, Tiff, TiffError, TiffResult, damaged, is_tiff, tag, unsupported,
@@ -16,7 +17,7 @@ use super::tiff::{
 use crate::error::Remedy;
 use crate::terrain::Source;
 use crate::terrain::crs::{Crs, GeoKeys, key, length_unit};
-use crate::terrain::raster::Raster;
+use crate::terrain::raster::{Raster, note_of_fill};
 
 pub(super) const FORMAT: Format = Format {
     name: "GeoTIFF",
@@ -33,30 +34,37 @@ fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
     refuse_pictures(image, &layout)?;
 
     let keys = geo_keys(image)?;
+    let beside = Auxiliary::beside(path);
     let metadata = image.text(tag::GDAL_METADATA)?.unwrap_or_default();
     let unit = match mode {
-        ReadMode::Heights => height_unit(&keys, &metadata)?,
+        ReadMode::Heights => height_unit(&keys, &metadata, &beside)?,
         ReadMode::Bands => None,
     };
     let Placement { origin, step } = place(path, image, &keys, layout.rows, &mut notes)?;
     let crs = Crs::from_geo_keys(keys).map_err(TiffError::Crs)?;
-    if mode == ReadMode::Heights {
-        note_assumptions(&layout, unit.is_some(), &crs, &mut notes);
+    let alpha = alpha_band(image, &layout)?;
+    let count = layout.bands - usize::from(alpha.is_some());
+    if mode == ReadMode::Heights && count > 1 {
+        notes.push(format!("the file has {count} bands; the first is taken for the height"));
     }
-    let nodata = image.text(tag::GDAL_NODATA)?.map(|t| t.trim().to_owned());
     let bands = match mode {
         ReadMode::Heights => 0..1,
-        ReadMode::Bands => 0..layout.bands,
+        ReadMode::Bands => 0..count,
     };
-    let mask = internal_mask(&images, &layout)?;
+    let nodata = image.text(tag::GDAL_NODATA)?.map(|t| t.trim().to_owned());
+    let nodata = beside.nodata(0).map(str::to_owned).or(nodata);
+    let mask = Mask::new(path, &images, &layout, alpha.filter(|_| nodata.is_none()))?;
+    let absent = if nodata.is_some() { f64::NAN } else { 0.0 };
     let bands = bands
         .map(|band| {
-            let mut values = layout.band(band)?;
-            void_nodata(&mut values, layout.sample, nodata.as_deref(), mask.as_deref(), &mut notes);
-            scale(&mut values, &metadata, band)?;
+            let mut values = layout.band(band, absent)?;
+            let nodata = beside.nodata(band).or(nodata.as_deref());
+            void_nodata(&mut values, layout.sample, nodata, &mask, &mut notes);
+            scale(&mut values, &metadata, &beside, band)?;
             Ok(values)
         })
         .collect::<TiffResult<_>>()?;
+    let says_height_unit = unit.is_some();
     let (height_unit, metres_per_height_unit) = unit.unwrap_or(("metre", 1.0));
     Ok(Raster {
         cols: layout.cols,
@@ -73,23 +81,9 @@ fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
             nodata,
             south_up: false,
         },
+        says_height_unit,
         notes,
     })
-}
-
-/// Notes what is assumed of the heights.
-fn note_assumptions(layout: &Layout, has_unit: bool, crs: &Crs, notes: &mut Vec<String>) {
-    if layout.bands > 1 {
-        let bands = layout.bands;
-        notes.push(format!("the file has {bands} bands; the first is taken for the height"));
-    }
-    if !has_unit && crs.unit().contains("foot") {
-        notes.push(format!(
-            "the map unit is the {}, but the file does not say the unit of the heights; \
-             they are taken as metres",
-            crs.unit()
-        ));
-    }
 }
 
 /// Bits of `NewSubfileType`.
@@ -248,7 +242,7 @@ fn void_nodata(
     values: &mut [f64],
     sample: Sample,
     nodata: Option<&str>,
-    mask: Option<&[f64]>,
+    mask: &Mask,
     notes: &mut Vec<String>,
 ) {
     let nodata = nodata.and_then(|text| match text.replace(',', ".").parse::<f64>() {
@@ -259,43 +253,73 @@ fn void_nodata(
             None
         }
     });
-    let lowest = values
+    values
         .par_chunks_mut(PART)
         .enumerate()
-        .map(|(part, values)| void_part(values, part * PART, nodata, mask))
-        .reduce(|| f64::INFINITY, f64::min);
-    // Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
-    if lowest < -12_000.0 || lowest == -9999.0 {
-        notes.push(format!(
-            "some cells hold {lowest}, which looks like a void that is not declared; \
-             declare it as the nodata value of the file"
-        ));
-    }
+        .for_each(|(part, values)| void_part(values, part * PART, nodata, mask));
+    notes.extend(note_of_fill(values));
 }
 
-/// Turns nodata, infinite and masked cells of a part, which begins at cell `first`, to `NaN`; the lowest of the others.
-fn void_part(values: &mut [f64], first: usize, nodata: Option<f64>, mask: Option<&[f64]>) -> f64 {
-    // An absent part of the mask is `NaN`, and not valid.
-    let masked = |i: usize| mask.is_some_and(|mask| mask[i] == 0.0 || mask[i].is_nan());
+/// Turns nodata, infinite and masked cells of a part, which begins at cell `first`, to `NaN`.
+fn void_part(values: &mut [f64], first: usize, nodata: Option<f64>, mask: &Mask) {
     for (i, value) in values.iter_mut().enumerate() {
-        if Some(*value) == nodata || value.is_infinite() || masked(first + i) {
+        if Some(*value) == nodata || value.is_infinite() || mask.is_void(first + i) {
             *value = f64::NAN;
         }
     }
-    values.iter().fold(f64::INFINITY, |low, &v| if v < low { v } else { low })
 }
 
-/// Validity of each cell from an internal mask of the same size: 1 where valid.
-fn internal_mask(images: &[Directory], layout: &Layout) -> TiffResult<Option<Vec<f64>>> {
-    for image in images {
-        if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == MASK {
-            let mask = Layout::new(image)?;
-            if (mask.cols, mask.rows) == (layout.cols, layout.rows) {
-                return mask.band(0).map(Some);
+/// Rasters of the size of the image that are 0 where a cell is void.
+struct Mask(Vec<Vec<f64>>);
+
+impl Mask {
+    /// The masks in the file, the one in a file `….msk` beside it, and the alpha band that is given.
+    fn new(
+        path: &Path,
+        images: &[Directory],
+        layout: &Layout,
+        alpha: Option<usize>,
+    ) -> TiffResult<Self> {
+        let mut masks = Vec::new();
+        for image in images {
+            if image.uint(tag::NEW_SUBFILE_TYPE, 0)? & (REDUCED | MASK) == MASK {
+                masks.extend(Self::of_size(image, layout)?);
             }
         }
+        let mut beside = path.as_os_str().to_owned();
+        beside.push(".msk");
+        if masks.is_empty()
+            && let Ok(bytes) = fs::read(&beside)
+            && is_tiff(&bytes)
+        {
+            let image = Directory::all(Tiff::new(&bytes)?)?;
+            masks.extend(Self::of_size(&image[0], layout)?);
+        }
+        if let Some(alpha) = alpha {
+            masks.push(layout.band(alpha, 0.0)?);
+        }
+        Ok(Self(masks))
     }
-    Ok(None)
+
+    /// The first band of a mask, if it has as many cells as the image.
+    fn of_size(image: &Directory, layout: &Layout) -> TiffResult<Option<Vec<f64>>> {
+        let mask = Layout::new(image)?;
+        let fits = (mask.cols, mask.rows) == (layout.cols, layout.rows);
+        fits.then(|| mask.band(0, 0.0)).transpose()
+    }
+
+    fn is_void(&self, cell: usize) -> bool {
+        self.0.iter().any(|mask| mask[cell] == 0.0)
+    }
+}
+
+/// The band that says how opaque a cell is; it is the last, if there is one.
+fn alpha_band(image: &Directory, layout: &Layout) -> TiffResult<Option<usize>> {
+    /// Values of `ExtraSamples` for associated and unassociated alpha (TIFF 6.0, section 18).
+    const ALPHA: [u64; 2] = [1, 2];
+    let extra = image.uints(tag::EXTRA_SAMPLES)?.unwrap_or_default();
+    let is_alpha = layout.bands > 1 && extra.last().is_some_and(|last| ALPHA.contains(last));
+    Ok(is_alpha.then(|| layout.bands - 1))
 }
 
 /// Text of the item of `GDAL_METADATA` with a role, for one band.
@@ -319,9 +343,13 @@ fn metadata_number(metadata: &str, role: &str, band: usize) -> TiffResult<Option
 }
 
 /// Turns stored numbers `v` into what they stand for: `scale · v + offset`.
-fn scale(values: &mut [f64], metadata: &str, band: usize) -> TiffResult<()> {
-    let scale = metadata_number(metadata, "scale", band)?.unwrap_or(1.0);
-    let offset = metadata_number(metadata, "offset", band)?.unwrap_or(0.0);
+fn scale(values: &mut [f64], metadata: &str, beside: &Auxiliary, band: usize) -> TiffResult<()> {
+    let number = |role| match beside.number(band, role) {
+        Some(number) => Ok(Some(number)),
+        None => metadata_number(metadata, role, band),
+    };
+    let scale = number("scale")?.unwrap_or(1.0);
+    let offset = number("offset")?.unwrap_or(0.0);
     if (scale, offset) != (1.0, 0.0) {
         values.par_iter_mut().for_each(|v| *v = scale * *v + offset);
     }
@@ -329,8 +357,13 @@ fn scale(values: &mut [f64], metadata: &str, band: usize) -> TiffResult<()> {
 }
 
 /// Name and metres of the unit of the heights: the band's own, else that of the vertical CRS.
-fn height_unit(keys: &GeoKeys, metadata: &str) -> TiffResult<Option<(&'static str, f64)>> {
-    if let Some(text) = metadata_item(metadata, "unittype", 0).filter(|t| !t.is_empty()) {
+fn height_unit(
+    keys: &GeoKeys,
+    metadata: &str,
+    beside: &Auxiliary,
+) -> TiffResult<Option<(&'static str, f64)>> {
+    let of_band = beside.unit(0).or_else(|| metadata_item(metadata, "unittype", 0));
+    if let Some(text) = of_band.filter(|t| !t.is_empty()) {
         return match named_unit(text) {
             Some(unit) => Ok(Some(unit)),
             None => unsupported(
@@ -377,6 +410,7 @@ fn named_unit(name: &str) -> Option<(&'static str, f64)> {
 mod tests {
     use super::*;
     use crate::error::Result;
+    use crate::terrain::HeightUnit;
 
     /// A little-endian TIFF of one uncompressed strip, with further tags of shorts, doubles or text.
     struct Writer {
@@ -402,6 +436,7 @@ mod tests {
         }
 
         fn shorts(mut self, tag: u16, values: &[u16]) -> Self {
+            self.entries.retain(|entry| entry.0 != tag);
             let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
             self.entries.push((tag, 3, values.len() as u32, bytes));
             self
@@ -529,6 +564,60 @@ mod tests {
         let raster = int16(&[-32768, 5]).read().unwrap();
         assert_eq!(raster.bands[0], [-32768.0, 5.0]);
         assert!(raster.notes.iter().any(|n| n.contains("-32768")));
+    }
+
+    #[test]
+    fn an_alpha_band_is_a_mask() {
+        // Two bands, cell by cell: heights 5, 6, 7, 8, and how opaque.
+        let samples = |extra: u16| {
+            let data: Vec<u8> =
+                [5u16, 0, 6, 255, 7, 1, 8, 0].iter().flat_map(|v| v.to_le_bytes()).collect();
+            let writer = Writer::new(2, 32, 1, &data).shorts(tag::BITS_PER_SAMPLE, &[16, 16]);
+            let writer = writer.shorts(tag::SAMPLES_PER_PIXEL, &[2]);
+            writer.shorts(tag::EXTRA_SAMPLES, &[extra])
+        };
+        let voids = |writer: Writer| {
+            writer.read().unwrap().bands[0].iter().map(|v| v.is_nan()).collect::<Vec<_>>()
+        };
+        assert_eq!(voids(samples(2)), [true, false, false, true]);
+        assert_eq!(voids(samples(0)), [false; 4]);
+        // As GDAL has it, a nodata value that is declared goes before.
+        assert_eq!(voids(samples(2).text(tag::GDAL_NODATA, "6")), [false, true, false, false]);
+    }
+
+    #[test]
+    fn bits_may_be_stored_in_reverse() {
+        let data: Vec<u8> = [300u16, 1, 2, 3].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let reversed: Vec<u8> = data.iter().map(|byte| byte.reverse_bits()).collect();
+        let raster = Writer::new(2, 16, 1, &reversed).shorts(tag::FILL_ORDER, &[2]).read().unwrap();
+        assert_eq!(raster.bands[0], [300.0, 1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn absent_blocks_are_nodata_or_zero() {
+        let absent = || int16(&[1, 2, 3, 4]).shorts(tag::STRIP_BYTE_COUNTS, &[0]);
+        assert_eq!(absent().read().unwrap().bands[0], [0.0; 4]);
+        let raster = absent().text(tag::GDAL_NODATA, "-1").read().unwrap();
+        assert!(raster.bands[0].iter().all(|v| v.is_nan()));
+    }
+
+    #[test]
+    fn files_beside_say_what_is_void_and_in_which_unit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("dem.tif");
+        fs::write(&path, int16(&[1, 2, 3, 4]).text(tag::GDAL_NODATA, "1").bytes()).unwrap();
+        let heights =
+            |unit| crate::terrain::Terrain::open_in(&path, unit).unwrap().heights().to_vec();
+        assert_eq!(heights(None)[1..], [2.0, 3.0, 4.0]);
+        assert_eq!(heights(Some(HeightUnit::Foot))[3], 4.0 * 0.3048);
+        let band = "<PAMRasterBand band=\"1\"><NoDataValue>3</NoDataValue><UnitType>ft</UnitType></PAMRasterBand>";
+        fs::write(folder.path().join("dem.tif.aux.xml"), band).unwrap();
+        assert!(heights(None)[2].is_nan() && heights(None)[0] == 0.3048);
+        assert_eq!(heights(Some(HeightUnit::Metre))[3], 4.0);
+        let mask = Writer::new(2, 8, 1, &[255, 255, 255, 0]);
+        fs::write(folder.path().join("dem.tif.msk"), mask.bytes()).unwrap();
+        let voids: Vec<bool> = heights(None).iter().map(|v| v.is_nan()).collect();
+        assert_eq!(voids, [false, false, true, true]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! SRTM tiles: big-endian metres, the place in the name, plain or in a gzip or zip.
 //!
 //! A tile covers one degree, its outermost nodes lie on the full degrees, and −32768 is a void (*SRTM
-//! Topography*, USGS, section 2).
+//! Topography*, USGS, section 2). Products made from SRTM mark voids by −32767 or −9999 as well.
 
 use std::io::Read;
 use std::path::Path;
@@ -19,11 +19,13 @@ pub(super) const FORMAT: Format =
 const GZIP: &[u8] = b"\x1f\x8b";
 const ZIP: &[u8] = b"PK\x03\x04";
 
-/// Nodes along a side: 3″ and 1″ tiles.
-const SIDES: [usize; 2] = [1201, 3601];
+/// Columns and rows: tiles of 3″, 1″, 2″ × 1″ (beyond 50° of latitude), ½″.
+const SIZES: [[usize; 2]; 4] = [[1201, 1201], [3601, 3601], [1801, 3601], [7201, 7201]];
 /// Bytes of the largest tile.
-const LARGEST: u64 = 2 * 3601 * 3601;
+const LARGEST: u64 = 2 * 7201 * 7201;
 const VOID: i16 = i16::MIN;
+/// Other voids; no land lies there.
+const OTHER_VOIDS: [i16; 2] = [-32767, -9999];
 
 /// A tile has no magic number: `.hgt`, or an archive of such a file by its name.
 fn is_named_so(head: &Head) -> bool {
@@ -45,9 +47,10 @@ fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
 
 /// Reads a tile that has been unpacked; `path` gives the place.
 fn read_tile(path: &Path, bytes: &[u8]) -> Result<Raster> {
-    let Some(side) = SIDES.into_iter().find(|side| 2 * side * side == bytes.len()) else {
-        let expected =
-            "2884802 or 25934402 bytes, for 1201 × 1201 or 3601 × 3601 cells of two bytes";
+    let Some([cols, rows]) = SIZES.into_iter().find(|[cols, rows]| 2 * cols * rows == bytes.len())
+    else {
+        let sizes = SIZES.map(|[cols, rows]| format!("{cols} × {rows}")).join(", ");
+        let expected = format!("2 bytes for each of {sizes} cells");
         let found = format!("{} bytes", bytes.len());
         return Err(Error::argument("the size of the tile", found, expected).in_file(path));
     };
@@ -57,16 +60,18 @@ fn read_tile(path: &Path, bytes: &[u8]) -> Result<Raster> {
         return Err(Error::argument("the name of the tile", found, expected).in_file(path));
     };
     let (cells, _) = bytes.as_chunks::<2>();
-    let height = |cell: &[u8; 2]| match i16::from_be_bytes(*cell) {
-        VOID => f64::NAN,
+    let stored = |cell: &[u8; 2]| i16::from_be_bytes(*cell);
+    let height = |cell: &[u8; 2]| match stored(cell) {
+        height if height == VOID || OTHER_VOIDS.contains(&height) => f64::NAN,
         height => height.into(),
     };
-    let step = 1.0 / (side - 1) as f64;
+    let other = cells.iter().map(stored).find(|height| OTHER_VOIDS.contains(height));
+    let note = other.map(|height| format!("cells of {height} were taken as voids"));
     Ok(Raster {
-        cols: side,
-        rows: side,
+        cols,
+        rows,
         origin: corner + DVec2::Y,
-        step: DVec2::new(step, -step),
+        step: DVec2::new(1.0 / (cols - 1) as f64, -1.0 / (rows - 1) as f64),
         crs: Crs::from_epsg(4326)?,
         bands: vec![cells.iter().map(height).collect()],
         source: Source {
@@ -75,13 +80,17 @@ fn read_tile(path: &Path, bytes: &[u8]) -> Result<Raster> {
             nodata: Some(VOID.to_string()),
             ..Source::default()
         },
-        notes: Vec::new(),
+        says_height_unit: true,
+        notes: note.into_iter().collect(),
     })
 }
 
-/// `N42E001…` is 42° N, 1° E.
+/// `N42E001.…` is 42° N, 1° E. More letters or digits behind it would say that it is another part of the world.
 fn south_west_corner(path: &Path) -> Option<DVec2> {
     let name = path.file_name()?.to_str()?.to_ascii_uppercase();
+    if name.get(7..)?.starts_with(|c: char| c.is_ascii_alphanumeric()) {
+        return None;
+    }
     let lat = degrees(name.get(..3)?, 'N', 'S')?;
     let lon = degrees(name.get(3..7)?, 'E', 'W')?;
     Some(DVec2::new(lon, lat))
@@ -156,7 +165,16 @@ mod tests {
         let at = |name: &str| south_west_corner(Path::new(name));
         assert_eq!(at("dir/N42E001.hgt"), Some(DVec2::new(1.0, 42.0)));
         assert_eq!(at("s01w002.SRTMGL1.hgt.zip"), Some(DVec2::new(-2.0, -1.0)));
-        for name in ["dem.hgt", "N4E001.hgt", "N42X001.hgt", "N+2E001.hgt", "N42", "é42E001.hgt"] {
+        assert_eq!(at("N42E001_1arc.hgt"), Some(DVec2::new(1.0, 42.0)));
+        for name in [
+            "N45W074T86.hgt",
+            "dem.hgt",
+            "N4E001.hgt",
+            "N42X001.hgt",
+            "N+2E001.hgt",
+            "N42",
+            "é42E001.hgt",
+        ] {
             assert_eq!(at(name), None, "{name}");
         }
     }
@@ -164,12 +182,20 @@ mod tests {
     #[test]
     fn a_tile_is_big_endian_and_runs_from_the_north_west() {
         let mut bytes = vec![0; 2 * 1201 * 1201];
-        bytes[..6].copy_from_slice(&[0x01, 0x02, 0xff, 0xff, 0x80, 0x00]);
+        bytes[..8].copy_from_slice(&[0x01, 0x02, 0xff, 0xff, 0x80, 0x00, 0x80, 0x01]);
         let raster = read_tile(Path::new("S01W002.hgt"), &bytes).unwrap();
         assert_eq!(raster.bands[0][..2], [258.0, -1.0]);
-        assert!(raster.bands[0][2].is_nan());
+        assert!(raster.bands[0][2].is_nan() && raster.bands[0][3].is_nan());
+        assert!(raster.notes[0].contains("-32767"));
         assert_eq!(raster.origin, DVec2::new(-2.0, 0.0));
         assert!(read_tile(Path::new("S01W002.hgt"), &bytes[1..]).is_err());
         assert!(read_tile(Path::new("tile.hgt"), &bytes).unwrap_err().to_string().contains("name"));
+    }
+
+    #[test]
+    fn tiles_of_the_north_have_half_the_columns() {
+        let raster = read_tile(Path::new("N61E010.hgt"), &vec![0; 2 * 1801 * 3601]).unwrap();
+        assert_eq!((raster.cols, raster.rows), (1801, 3601));
+        assert_eq!(raster.step, DVec2::new(1.0 / 1800.0, -1.0 / 3600.0));
     }
 }

@@ -3,6 +3,7 @@
 //! **A new format** is a file beside this one that holds a [`Format`], and a line in [`FORMATS`].
 
 mod ascii_grid;
+mod auxiliary;
 mod foreign;
 mod format;
 mod geotiff;

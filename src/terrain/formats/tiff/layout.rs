@@ -26,6 +26,8 @@ pub(crate) struct Layout<'a> {
     codec: Codec,
     predictor: Predictor,
     chunks: Chunks,
+    /// `FillOrder` 2: the bits of every stored byte are in reverse order, also where it is compressed (TIFF 6.0, section 8).
+    is_bit_reversed: bool,
 }
 
 /// The parts of an image that are stored by themselves.
@@ -52,12 +54,6 @@ impl<'a> Layout<'a> {
         };
         let bits = common_value(image, tag::BITS_PER_SAMPLE)?;
         let sample = Sample::new(bits, common_value(image, tag::SAMPLE_FORMAT)?)?;
-        if matches!(sample, Sample::Packed(_)) && image.uint(tag::FILL_ORDER, 1)? == 2 {
-            return unsupported(
-                "packed samples in FillOrder 2, which are not read",
-                Remedy::Convert,
-            );
-        }
         let layout = Self {
             tiff: image.tiff,
             cols,
@@ -67,6 +63,7 @@ impl<'a> Layout<'a> {
             codec: Codec::new(image.uint(tag::COMPRESSION, 1)?)?,
             predictor: Predictor::new(image.uint(tag::PREDICTOR, 1)?, sample)?,
             chunks: Chunks::new(image, cols, rows, bands)?,
+            is_bit_reversed: image.uint(tag::FILL_ORDER, 1)? == 2,
         };
         layout.check_size()?;
         Ok(layout)
@@ -119,8 +116,8 @@ impl<'a> Layout<'a> {
         Ok(())
     }
 
-    /// The samples of a band, row by row as stored; `NaN` where a chunk is absent.
-    pub(crate) fn band(&self, band: usize) -> TiffResult<Vec<f64>> {
+    /// The samples of a band, row by row as stored; `absent` where a chunk is.
+    pub(crate) fn band(&self, band: usize, absent: f64) -> TiffResult<Vec<f64>> {
         let cells = self.cols * self.rows;
         let what = format!("a band of {} × {} cells", self.cols, self.rows);
         memory::check(what, memory::bytes(cells, size_of::<f64>()))?;
@@ -133,12 +130,18 @@ impl<'a> Layout<'a> {
         let error = values
             .par_chunks_mut(self.chunks.rows * self.cols)
             .enumerate()
-            .find_map_first(|(down, rows)| self.read_chunk_row(band, down, rows).err());
+            .find_map_first(|(down, rows)| self.read_chunk_row(band, down, absent, rows).err());
         error.map_or(Ok(values), Err)
     }
 
     /// Fills the rows that one row of chunks covers.
-    fn read_chunk_row(&self, band: usize, down: usize, rows: &mut [f64]) -> TiffResult<()> {
+    fn read_chunk_row(
+        &self,
+        band: usize,
+        down: usize,
+        absent: f64,
+        rows: &mut [f64],
+    ) -> TiffResult<()> {
         let across = self.chunks_across();
         let (plane, first) = if self.chunks.planar { (band, 0) } else { (0, band) };
         let chunk_rows = if self.chunks.tiled { self.chunks.rows } else { rows.len() / self.cols };
@@ -148,7 +151,7 @@ impl<'a> Layout<'a> {
             let width = self.chunks.cols.min(self.cols - left);
             let Some(bytes) = self.read_chunk(index, chunk_rows)? else {
                 let lines = rows.chunks_exact_mut(self.cols);
-                lines.for_each(|line| line[left..left + width].fill(f64::NAN));
+                lines.for_each(|line| line[left..left + width].fill(absent));
                 continue;
             };
             let stored_rows = bytes.chunks_exact(self.row_bytes());
@@ -188,6 +191,13 @@ impl<'a> Layout<'a> {
                 format!("enough to expand to {length}"),
             );
         }
+        let reversed: Vec<u8>;
+        let stored = if self.is_bit_reversed {
+            reversed = stored.iter().map(|byte| byte.reverse_bits()).collect();
+            &reversed
+        } else {
+            stored
+        };
         let mut bytes = self.codec.expand(stored, length).map_err(|e| Error::damaged(chunk, e))?;
         for row in bytes.chunks_exact_mut(self.row_bytes()) {
             self.predictor.undo(row, self.sample, self.interleaved(), self.tiff.big_endian);
