@@ -66,7 +66,7 @@ pub(super) struct Raster {
 pub(super) fn note_of_fill(values: &[f64]) -> Option<String> {
     /// Heights are beyond one of these before a look at the others is worth the time, and so far off the next.
     const SUSPICIOUS: [f64; 2] = [-990.0, 9000.0];
-    const FAR: f64 = 1000.0;
+    const FAR: f64 = 500.0;
     /// Nothing on the Earth or the Moon lies deeper than 11 km below the datum.
     const DEEPEST: f64 = -12_000.0;
     let [low, high] = extremes(values, [f64::INFINITY, f64::NEG_INFINITY]);
