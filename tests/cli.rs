@@ -359,6 +359,7 @@ fn compare_fills_a_folder_and_repeats_itself() {
         "route",
         "length",
         "climb",
+        "DEM climb",
         "max grade",
         "mean grade",
         "∫|κn|ds",
@@ -372,10 +373,15 @@ fn compare_fills_a_folder_and_repeats_itself() {
     for (r, metric) in ["isotropic", "curvature", "difference"].into_iter().enumerate() {
         assert_eq!(summary["routes"][r]["name"], metric);
         assert_eq!(summary["routes"][r]["costs"][metric]["ratio_to_best"], 1.0);
+        // On ground as even as this, the DEM climbs about as much as the surface that is fitted to it.
+        let of = |heights: &str| summary["routes"][r][heights]["climb_m"].as_f64().unwrap();
+        let ratio = of("on_dem") / of("summary");
+        assert!((ratio - 1.0).abs() < 0.05 && ratio != 1.0, "{ratio}");
     }
     assert!(is_png(&folder.path("cmp/map.png")));
     assert_eq!(folder.json("cmp/routes.geojson")["features"].as_array().unwrap().len(), 3);
-    assert!(folder.read("cmp/profile.csv").contains("\nisotropic,"));
+    let profile = folder.read("cmp/profile.csv");
+    assert!(profile.contains("\nisotropic,") && profile.contains(",dem_height_m\n"), "{profile}");
     folder.write("cmp/mine.txt", "keep");
     folder.bad(line, 2, "cmp/routes.geojson: exists; give --overwrite to replace it");
     let again = folder.good(&format!("{line} --overwrite --threads 1"));

@@ -54,7 +54,7 @@ pub use self::place::{Notation, Place, coordinate};
 pub use self::provenance::{MetricRecord, Provenance};
 pub use self::question::Question;
 pub use self::report::{
-    ComparedRoute, ComparisonReport, Cost, CrsRecord, DistanceReport, DistanceStatistics,
+    ComparedRoute, ComparisonReport, Cost, CrsRecord, DemClimb, DistanceReport, DistanceStatistics,
     GoalDistance, InfoReport, MatchReport, MatchedPair, MatchedRegion, MatchedSurface, NamedRoute,
     RegionRecord, RouteReport, SegmentReport, SolverWork,
 };

@@ -10,6 +10,7 @@ use super::raster::{HeightUnit, Source, void_infinite};
 use super::{Crs, Georeference};
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
+use crate::linalg::bilinear::{CORNERS, corner_weights};
 
 /// Heights at the nodes of a grid, in metres; `NaN` marks a void.
 ///
@@ -133,6 +134,25 @@ impl Terrain {
         self.heights[self.frame().index(col, row)].is_nan()
     }
 
+    /// Height of the DEM in metres at grid coordinates, clamped to the hull of the nodes: bilinear between the nodes, `NaN` where one of
+    /// them is void.
+    #[must_use]
+    pub fn height(&self, at: DVec2) -> f64 {
+        let frame = self.frame();
+        let (at, cols, last_row) = (frame.clamp(at), frame.cols(), frame.rows() - 1);
+        let corner = at.floor();
+        let height = |i: isize, j: isize| {
+            // Beyond the last column comes the first again, or has no weight.
+            let col = (corner.x as isize + i).rem_euclid(cols as isize) as usize;
+            self.heights[frame.index(col, (corner.y as usize + j as usize).min(last_row))]
+        };
+        let corners = CORNERS.into_iter().zip(corner_weights(at - corner));
+        corners
+            .filter(|&(_, weight)| weight > 0.0)
+            .map(|((i, j), weight)| weight * height(i, j))
+            .sum()
+    }
+
     /// Number of voids, and smallest, largest and mean height in metres (`None` if all are void).
     #[must_use]
     pub fn statistics(&self) -> (usize, Option<[f64; 3]>) {
@@ -249,6 +269,16 @@ mod tests {
         assert_eq!(void.statistics(), (1, None));
         let error = Terrain::new(frame(2, 2), vec![0.0; 3], Crs::none()).unwrap_err();
         assert!(error.to_string().starts_with("the number of heights is 3; it must be 4"));
+    }
+
+    #[test]
+    fn heights_are_bilinear_between_nodes_and_void_beside_voids() {
+        let heights = vec![0.0, 10.0, f64::NAN, 20.0, 30.0, 40.0];
+        let terrain = Terrain::new(frame(3, 2), heights, Crs::none()).unwrap();
+        let height = |x, y| terrain.height(DVec2::new(x, y));
+        assert_eq!([height(0.5, 0.5), height(1.0, 0.0), height(2.0, 1.0)], [15.0, 10.0, 40.0]);
+        assert_eq!([height(-3.0, 9.0), height(1.25, 1.0)], [20.0, 32.5]);
+        assert!(height(1.5, 0.5).is_nan() && height(2.0, 0.0).is_nan());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use ridgeway::terrain::Crs;
 use ridgeway::{Comparison, Control, MetricField, Route, Terrain};
 
 use super::render;
-use super::route::{HEADER, measures, profiles};
+use super::route::{HEADER, HEIGHTS, measures, profiles};
 use crate::args::{CURVATURE, CompareArgs, RunArgs, metric_named};
 use crate::failure::{Failure, Result};
 use crate::output::{check_outputs_in, write_contents};
@@ -41,16 +41,16 @@ pub(super) fn run(args: &CompareArgs, run: &RunArgs, control: &Control) -> Resul
         .collect::<Result<Vec<_>>>()?;
     let comparison =
         scenario.compare(&fields, control).map_err(Failure::naming_goals(&scenario))?;
-    let table = table(&fields, &comparison).to_string();
     let provenance = scenario.provenance(&fields, Some(command_line()));
-    let report = ComparisonReport::new(&fields, &comparison, provenance);
+    let report = ComparisonReport::new(&fields, &comparison, &terrain, provenance);
+    let table = table(&fields, &comparison, &report).to_string();
     if let Some(folder) = &args.output {
         let contents = contents((&scenario, &terrain), &fields, &comparison, &report, control)?;
         control.check()?;
         write_contents(folder, args.overwrite, &FILES, &contents)?;
     }
     let written = args.output.iter().map(|folder| wrote_files(folder, scenario.georeference.crs()));
-    Report::new(table + EXPLANATION + &written.collect::<String>(), report).print(run)
+    Report::new(table + HEIGHTS + EXPLANATION + &written.collect::<String>(), report).print(run)
 }
 
 const EXPLANATION: &str =
@@ -78,13 +78,13 @@ fn wrote_files(folder: &Path, crs: &Crs) -> String {
     wrote_on(&folder.join(FILES[0]), crs) + &wrote_in(folder, &FILES[1..])
 }
 
-fn table(fields: &[MetricField<'_>], comparison: &Comparison) -> Table {
+fn table(fields: &[MetricField<'_>], comparison: &Comparison, report: &ComparisonReport) -> Table {
     let mut table = Table::default();
     let ratios = fields.iter().map(|field| format!("x {}", field.name()));
     table.row(HEADER.into_iter().map(String::from).chain(ratios));
-    for (r, (field, route)) in fields.iter().zip(&comparison.routes).enumerate() {
+    for (r, compared) in report.routes.iter().enumerate() {
         let ratios = (0..fields.len()).map(|m| format!("{:.3}", comparison.ratio(m, r)));
-        table.row(measures(field.name(), route).into_iter().chain(ratios));
+        table.row(measures(&compared.route).into_iter().chain(ratios));
     }
     table
 }
@@ -102,7 +102,7 @@ fn contents(
     let geojson = routes_geojson(&named, scenario.georeference.crs(), &report.provenance)?;
     Ok([
         geojson.into_bytes(),
-        profiles(&named, scenario)?,
+        profiles(&named, (scenario, terrain))?,
         json(report).into_bytes(),
         render::map((scenario, terrain), fields, routes, distances, PIXELS, control)?,
     ])

@@ -10,4 +10,4 @@ pub use self::info::{CrsRecord, InfoReport};
 pub use self::regions::{
     MatchReport, MatchedPair, MatchedRegion, MatchedSurface, RegionRecord, SegmentReport,
 };
-pub use self::routes::{ComparedRoute, ComparisonReport, Cost, NamedRoute, RouteReport};
+pub use self::routes::{ComparedRoute, ComparisonReport, Cost, DemClimb, NamedRoute, RouteReport};

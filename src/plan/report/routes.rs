@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::metric::{MetricField, Unit};
 use crate::plan::provenance::Provenance;
 use crate::route::{Comparison, Route, Summary};
+use crate::terrain::Terrain;
 
 /// Routes to the goals of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,22 +23,50 @@ pub struct RouteReport {
 pub struct NamedRoute {
     /// Its name, such as `to pixel:3,4`.
     pub name: String,
-    /// Its numbers.
+    /// Its numbers, on the smooth surface.
     pub summary: Summary,
+    /// What it climbs on the heights of the DEM, which are rougher.
+    pub on_dem: DemClimb,
+}
+
+/// Rises and falls from point to point of a route, half a cell apart or less, with heights that are bilinear between those of the DEM. Voids are
+/// passed over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct DemClimb {
+    /// Sum of rises, m.
+    pub climb_m: f64,
+    /// Sum of falls, m.
+    pub descent_m: f64,
+}
+
+impl DemClimb {
+    /// What a route climbs on the heights of a terrain.
+    #[must_use]
+    pub fn of(route: &Route, terrain: &Terrain) -> Self {
+        let heights = route.grid.iter().map(|&at| terrain.height(at)).filter(|z| z.is_finite());
+        let heights: Vec<f64> = heights.collect();
+        let rises = heights.windows(2).map(|ends| ends[1] - ends[0]);
+        rises.fold(Self::default(), |Self { climb_m, descent_m }, rise| Self {
+            climb_m: climb_m + rise.max(0.0),
+            descent_m: descent_m + (-rise).max(0.0),
+        })
+    }
 }
 
 impl RouteReport {
-    /// The numbers of routes with names.
+    /// The numbers of routes with names over a terrain.
     #[must_use]
-    pub fn new(routes: &[(&str, &Route)], provenance: Provenance) -> Self {
-        let routes = routes.iter().map(|(name, route)| NamedRoute::new(name, route)).collect();
+    pub fn new(routes: &[(&str, &Route)], terrain: &Terrain, provenance: Provenance) -> Self {
+        let routes =
+            routes.iter().map(|(name, route)| NamedRoute::new(name, route, terrain)).collect();
         Self { routes, provenance }
     }
 }
 
 impl NamedRoute {
-    fn new(name: &str, route: &Route) -> Self {
-        Self { name: name.to_owned(), summary: route.summary.clone() }
+    fn new(name: &str, route: &Route, terrain: &Terrain) -> Self {
+        let on_dem = DemClimb::of(route, terrain);
+        Self { name: name.to_owned(), summary: route.summary.clone(), on_dem }
     }
 }
 
@@ -72,16 +101,17 @@ pub struct Cost {
 }
 
 impl ComparisonReport {
-    /// The routes of a comparison under `fields`.
+    /// The routes of a comparison under `fields` over a terrain.
     #[must_use]
     pub fn new(
         fields: &[MetricField<'_>],
         comparison: &Comparison,
+        terrain: &Terrain,
         provenance: Provenance,
     ) -> Self {
         let routes = fields.iter().zip(&comparison.routes).enumerate();
         let routes = routes.map(|(r, (field, route))| ComparedRoute {
-            route: NamedRoute::new(field.name(), route),
+            route: NamedRoute::new(field.name(), route, terrain),
             costs: costs_of(r, fields, comparison),
         });
         Self { routes: routes.collect(), provenance }
