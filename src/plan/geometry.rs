@@ -11,11 +11,16 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::grid::{Shapes, rasterise};
+use crate::memory;
 use crate::terrain::{Crs, Georeference};
 
 /// What a file of geometry must be.
 const EXPECTED: &str = "GeoJSON, in longitude and latitude (RFC 7946)";
+const CONVERT: &str = "convert it to GeoJSON in EPSG:4326";
 const REPROJECT: &str = "reproject the geometry to EPSG:4326, longitude before latitude";
+
+/// How much larger GeoJSON is in memory than in a file: a position of 13 characters is a list of numbers in a list.
+const TIMES_IN_MEMORY: u64 = 10;
 
 /// Points, lines and areas of a GeoJSON file in grid coordinates. Positions are longitude and latitude (RFC 7946), or in the CRS that a
 /// member `crs` names by an EPSG code (GeoJSON 2008). UTF-8 or UTF-16, with or without a byte order mark.
@@ -26,6 +31,8 @@ const REPROJECT: &str = "reproject the geometry to EPSG:4326, longitude before l
 /// The file cannot be read, is not GeoJSON, holds no geometry, names an unknown CRS, has latitude before longitude; the grid has no CRS.
 pub fn read_geojson(path: impl AsRef<Path>, georeference: &Georeference) -> Result<Shapes> {
     let path = path.as_ref();
+    let length = fs::metadata(path).map_or(0, |metadata| metadata.len());
+    memory::check(format!("the file {}", path.display()), length.saturating_mul(TIMES_IN_MEMORY))?;
     let bytes = fs::read(path).map_err(|source| Error::io(path, source))?;
     shapes_of(&bytes, georeference).map_err(|error| error.in_file(path))
 }
@@ -43,8 +50,7 @@ fn shapes_of(bytes: &[u8], georeference: &Georeference) -> Result<Shapes> {
         return Err(Error::argument("the file", "empty", "GeoJSON"));
     }
     if bytes.starts_with(&SHAPEFILE) {
-        let advice = "convert it to GeoJSON in EPSG:4326";
-        return Err(Error::argument("the file", "a shapefile", EXPECTED).advise(advice));
+        return Err(Error::argument("the file", "a shapefile", EXPECTED).advise(CONVERT));
     }
     let text = decoded(bytes)?;
     let shapes = shapes_in_file(&text).map_err(not_geojson)?;
@@ -72,7 +78,7 @@ fn decoded(bytes: &[u8]) -> Result<String> {
 }
 
 fn not_geojson(cause: impl fmt::Display) -> Error {
-    Error::argument("the file", format!("not GeoJSON ({cause})"), EXPECTED)
+    Error::argument("the file", format!("not GeoJSON ({cause})"), EXPECTED).advise(CONVERT)
 }
 
 /// The member of GeoJSON 2008 that RFC 7946 no longer has.

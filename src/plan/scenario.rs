@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use geo_types::Polygon;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::geometry::{read_geojson, touches};
+use super::geometry::read_geojson;
 use super::place::Place;
 use super::question::Question;
 use super::rasters::{read_costs, read_tensors};
@@ -62,7 +63,7 @@ impl Scenario {
     pub fn on(terrain: &Terrain, question: Question, control: &Control) -> Result<Self> {
         let georeference = terrain.georeference();
         let mut notes = Vec::new();
-        let barrier = read_barriers(&question, georeference, &mut notes)?;
+        let barrier = read_barriers(&question, terrain, &mut notes)?;
         let (start_shapes, starts) = locate(Role::Start, &question.starts, terrain)?;
         let (goal_shapes, goals) = locate(Role::Goal, &question.goals, terrain)?;
         for (goal, shapes) in question.goals.iter().zip(&goal_shapes) {
@@ -241,28 +242,48 @@ impl Scenario {
     }
 }
 
-/// The cells that the barriers touch, row-major; `None` without barriers. A file that touches none gets a note.
+/// The cells that the barriers touch, row-major; `None` without barriers. A file that is not what a barrier should be gets a note.
 fn read_barriers(
     question: &Question,
-    georeference: &Georeference,
+    terrain: &Terrain,
     notes: &mut Vec<String>,
 ) -> Result<Option<Arc<[bool]>>> {
     let mut cells: Option<Vec<bool>> = None;
     for path in &question.barriers {
-        let shapes = read_geojson(path, georeference)?;
-        if !touches(&shapes, georeference) {
-            notes.push(format!(
-                "{}: the barrier lies outside the DEM and stops nothing",
-                path.display()
-            ));
+        let shapes = read_geojson(path, terrain.georeference())?;
+        let touched = rasterise(terrain.frame(), &shapes);
+        if let Some(note) = note_of_barrier(&shapes, &touched, terrain) {
+            notes.push(format!("{}: the barrier {note}", path.display()));
         }
-        let touched = rasterise(georeference.frame(), &shapes);
         match &mut cells {
             Some(cells) => cells.iter_mut().zip(touched).for_each(|(cell, more)| *cell |= more),
             None => cells = Some(touched),
         }
     }
     Ok(cells.map(Arc::from))
+}
+
+/// What the user should know of a barrier that touches these cells.
+fn note_of_barrier(shapes: &Shapes, touched: &[bool], terrain: &Terrain) -> Option<&'static str> {
+    let mut stopped =
+        terrain.heights().iter().zip(touched).filter(|&(_, &touched)| touched).peekable();
+    if stopped.peek().is_none() {
+        Some("lies outside the DEM and stops nothing")
+    } else if stopped.all(|(height, _)| height.is_nan()) {
+        Some("lies on voids, which nobody enters anyway, and stops nothing")
+    } else if shapes.polygons.iter().any(is_flat) {
+        Some("has an area without an inside: it stops where its border runs only")
+    } else {
+        None
+    }
+}
+
+/// Whether the outer border of a polygon surrounds nothing.
+fn is_flat(polygon: &Polygon<f64>) -> bool {
+    /// Square cells, far less than matters and more than rounding leaves.
+    const SMALLEST: f64 = 1e-6;
+    let double: f64 = polygon.exterior().lines().map(|side| side.determinant()).sum();
+    double.abs() < SMALLEST
 }
 
 /// Cells that are neither void nor barrier.
@@ -393,18 +414,34 @@ mod tests {
     }
 
     #[test]
-    fn a_barrier_outside_the_dem_gets_a_note() {
+    fn a_barrier_that_stops_nothing_gets_a_note() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("far.geojson");
-        std::fs::write(&path, r#"{"type":"LineString","coordinates":[[10,46],[10.1,46]]}"#)
-            .unwrap();
+        let path = folder.path().join("wall.geojson");
         let crs = Crs::from_epsg(32632).unwrap();
         let frame =
             GridFrame::new(9, 5, DVec2::new(5e5, 5e6), DVec2::splat(10.0), crs.ground()).unwrap();
-        let terrain = Terrain::new(frame, vec![100.0; 45], crs).unwrap();
-        let mut question = Question::new("level.tif").from(Place::pixel(1.0, 1.0));
-        question.barriers.push(path);
-        let scenario = Scenario::on(&terrain, question, &Control::default()).unwrap();
-        assert!(scenario.notes[0].contains("outside the DEM"), "{:?}", scenario.notes);
+        let mut heights = vec![100.0; 45];
+        heights[22] = f64::NAN;
+        let terrain = Terrain::new(frame, heights, crs).unwrap();
+        let question = Question {
+            barriers: vec![path.clone()],
+            ..Question::new("level.tif").from(Place::pixel(1.0, 1.0))
+        };
+        let notes = |kind: &str, cells: &[[f64; 2]]| {
+            let lonlat = |&cell: &[f64; 2]| terrain.to_lonlat(cell.into()).unwrap().to_array();
+            let line: Vec<_> = cells.iter().map(lonlat).collect();
+            let coordinates =
+                if kind == "Polygon" { format!("[{line:?}]") } else { format!("{line:?}") };
+            let text = format!(r#"{{"type":"{kind}","coordinates":{coordinates}}}"#);
+            std::fs::write(&path, text).unwrap();
+            Scenario::on(&terrain, question.clone(), &Control::default()).unwrap().notes
+        };
+        assert_eq!(notes("LineString", &[[3.0, 1.0], [3.0, 4.0]]), [""; 0]);
+        let outside = notes("LineString", &[[300.0, 1.0], [300.0, 4.0]]);
+        assert!(outside[0].contains("lies outside the DEM"), "{outside:?}");
+        let on_void = notes("MultiPoint", &[[4.0, 2.0]]);
+        assert!(on_void[0].contains("lies on voids"), "{on_void:?}");
+        let flat = notes("Polygon", &[[3.0, 1.0], [5.0, 3.0], [4.0, 2.0], [3.0, 1.0]]);
+        assert!(flat[0].contains("without an inside"), "{flat:?}");
     }
 }

@@ -214,7 +214,7 @@ impl Terrain {
         (least < 1.0 - NOTABLE || most > 1.0 + NOTABLE).then(|| {
             format!(
                 "a metre of this map is {least:.3} to {most:.3} m on the ground, and distances are those of the map; \
-                 reproject the DEM to longitude and latitude or to the UTM zone for those of the ground"
+                 reproject the DEM to longitude and latitude, or on the Earth to the UTM zone, for those of the ground"
             )
         })
     }

@@ -91,7 +91,7 @@ impl<'a> Layout<'a> {
     fn check_size(&self) -> TiffResult<()> {
         /// Most cells, and bands of them, that may be absent (sparse), for which the file has no bytes.
         const SPARSE_CELLS: u64 = 1 << 24;
-        const SPARSE_BANDS: u64 = 16;
+        const SPARSE_BANDS: u64 = 4;
         let planes = if self.chunks.planar { self.bands } else { 1 };
         let chunks = (self.chunks_across() * self.chunks_down()).saturating_mul(planes);
         let listed = self.chunks.offsets.len().min(self.chunks.counts.len());
