@@ -6,6 +6,7 @@ use super::clusters::{node, seed_cover};
 use crate::control::Control;
 use crate::eikonal::{Solver, StartRegion, Stop, TensorField};
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// Steps to the neighbours of a node, as (columns, rows).
 const RING: [(isize, isize); 8] =
@@ -83,6 +84,9 @@ pub struct Segmentation {
     pub levels: Vec<Level>,
 }
 
+/// About the most that cutting takes for a node: the peak at 3000², less what there was before.
+const BYTES_PER_NODE: usize = 60;
+
 impl Segmentation {
     /// Cuts the open nodes of a field. Seeds are taken in ascending order of `ranks`, one for each node, row-major:
     /// [`MetricField::seed_ranks`](crate::MetricField::seed_ranks) gives them.
@@ -108,6 +112,10 @@ impl Segmentation {
                 format!("{}, that of the nodes", cols * rows),
             ));
         }
+        memory::check(
+            format!("cutting {cols} × {rows} cells"),
+            memory::bytes(ranks.len(), BYTES_PER_NODE),
+        )?;
         let open: Vec<usize> =
             (0..ranks.len()).filter(|&i| field.is_open(i % cols, i / cols)).collect();
         if open.is_empty() {
