@@ -25,7 +25,7 @@ const TIMES_IN_MEMORY: u64 = 10;
 /// Points, lines and areas of a GeoJSON file in grid coordinates. Positions are longitude and latitude (RFC 7946), or in the CRS that a
 /// member `crs` names by an EPSG code (GeoJSON 2008). UTF-8 or UTF-16, with or without a byte order mark.
 ///
-/// Shapes may lie outside the grid: [`touches`] tells.
+/// Shapes may lie outside the grid.
 ///
 /// # Errors
 /// The file cannot be read, is not GeoJSON, holds no geometry, names an unknown CRS, has latitude before longitude; the grid has no CRS.
