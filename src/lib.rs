@@ -68,6 +68,7 @@
 //! * `export`: files of routes, isolines, regions and rasters ([`export`]).
 //! * `plan`: questions and reports, with `export` ([`plan`]).
 //! * `render`: pictures ([`render`]).
+//! * `lzma`: GeoTIFF that is compressed by LZMA is read too.
 //! * `zip`: SRTM tiles are read from zip archives too.
 //! * `cli` (default): the `ridgeway` command, with all of the above.
 

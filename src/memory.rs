@@ -3,7 +3,8 @@
 //! Where the system overcommits, as Linux does, an allocation that is too large succeeds and the process is killed when it writes there;
 //! under a limit on addresses it fails at once. Both are foreseen by what `/proc` and the control groups say. Other systems say nothing here.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -31,9 +32,46 @@ pub(crate) fn check(what: impl Into<String>, bytes: u64) -> Result<()> {
     }
 }
 
-/// Bytes of an array of `count` numbers for each of `nodes`.
-pub(crate) fn bytes(nodes: usize, each: usize) -> u64 {
-    (nodes as u64).saturating_mul(each as u64)
+/// [`check`] for so many bytes a cell; `what` goes on with the number of cells: `a distance over`.
+pub(crate) fn check_cells(what: &str, [cols, rows]: [usize; 2], bytes_each: usize) -> Result<()> {
+    let bytes = [cols, rows, bytes_each].map(|n| n as u64).into_iter().fold(1, u64::saturating_mul);
+    check(format!("{what} {cols} × {rows} cells"), bytes)
+}
+
+/// Reads the rest of a file, whose content takes `times` as much memory when it is understood.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::TooLarge`], also for what has no length and may have no end, such as a pipe.
+pub(crate) fn read_rest(
+    path: &Path,
+    file: &mut File,
+    times: u64,
+    into: &mut Vec<u8>,
+) -> Result<()> {
+    /// Longest text that is taken from a pipe: 4 GiB.
+    const LONGEST: u64 = 1 << 32;
+    let what = || format!("the file {}", path.display());
+    let length = file.metadata().ok().filter(fs::Metadata::is_file).map(|data| data.len());
+    check(what(), length.unwrap_or(0).saturating_mul(times))?;
+    let most = match length {
+        Some(_) => u64::MAX,
+        // A vector that grows takes twice its length for a moment.
+        None => available().map_or(LONGEST, |free| LONGEST.min(free / (times + 2))),
+    };
+    match file.take(most).read_to_end(into) {
+        Ok(read) if (read as u64) < most => Ok(()),
+        Ok(read) => Err(Error::TooLarge {
+            what: what(),
+            bytes: (read as u64).saturating_mul(times + 2),
+            limit: available(),
+        }),
+        Err(e) if e.kind() == io::ErrorKind::OutOfMemory => Err(Error::TooLarge {
+            what: what(),
+            bytes: length.unwrap_or(into.len() as u64),
+            limit: None,
+        }),
+        Err(e) => Err(Error::io(path, e)),
+    }
 }
 
 /// The bytes that this process may still take: the least of what the machine, its control group and its own limits leave; `None` if

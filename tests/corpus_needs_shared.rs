@@ -11,11 +11,7 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 /// Files that could be read but are refused, with a word of the message.
-const REFUSED: [(&str, &str); 3] = [
-    ("strip_i16_lzma.tif", "LZMA"),
-    ("tile_f32_lzma.tif", "LZMA"),
-    ("geo_rotated_modeltransformation.tif", "rotated"),
-];
+const REFUSED: [(&str, &str); 1] = [("geo_rotated_modeltransformation.tif", "rotated")];
 
 /// Longest that any of the small files may take, damaged or not.
 const PATIENCE: Duration = Duration::from_secs(5);

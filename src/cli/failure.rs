@@ -90,6 +90,7 @@ fn tool(remedy: Remedy) -> &'static str {
         Remedy::ScaleToMetres => ", for example with `gdal_calc.py`",
         Remedy::ResampleToDem => ", for example with `gdalwarp -te -ts`",
         Remedy::ReprojectToDem => ", for example with `gdalwarp -t_srs -te -ts`",
+        Remedy::ConvertToGeoJson => ", with `ogr2ogr -t_srs EPSG:4326 OUT.geojson IN`",
         Remedy::Unpack => ", for example with `gunzip` or `unzip`",
         Remedy::FetchFromLfs => " with `git lfs pull`",
         _ => "",

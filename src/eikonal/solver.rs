@@ -72,12 +72,8 @@ impl Solver {
         stop: &Stop,
         control: &Control,
     ) -> Result<DistanceMap> {
-        let (cols, rows) = (metric.surface().cols(), metric.surface().rows());
-        let what = format!("a distance over {cols} × {rows} cells");
-        memory::check(
-            what,
-            memory::bytes(cols.saturating_mul(rows), self.accuracy.bytes_per_node()),
-        )?;
+        let size = [metric.surface().cols(), metric.surface().rows()];
+        memory::check_cells("a distance over", size, self.accuracy.bytes_per_node())?;
         self.solve_field(TensorField::sample(metric, control)?, starts, stop, control)
     }
 

@@ -43,6 +43,8 @@ pub enum Remedy {
     ResampleToDem,
     /// Reproject it to the CRS of the DEM and resample it to its grid.
     ReprojectToDem,
+    /// Convert geometry to GeoJSON in longitude and latitude.
+    ConvertToGeoJson,
     /// Unpack it.
     Unpack,
     /// Fetch what a Git LFS pointer points to.
@@ -74,6 +76,7 @@ impl fmt::Display for Remedy {
             Self::ScaleToMetres => "scale the heights to metres",
             Self::ResampleToDem => "resample it to the grid of the DEM",
             Self::ReprojectToDem => "reproject it to the CRS and the grid of the DEM",
+            Self::ConvertToGeoJson => "convert it to GeoJSON in longitude and latitude, EPSG:4326",
             Self::Unpack => "unpack it first",
             Self::FetchFromLfs => "fetch what it points to",
         })

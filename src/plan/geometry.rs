@@ -1,7 +1,8 @@
 //! Geometry files.
 
+use std::fmt;
+use std::fs::File;
 use std::path::Path;
-use std::{fmt, fs};
 
 use geo_types::Geometry;
 use geojson::{GeoJson, GeometryValue, Position};
@@ -9,15 +10,13 @@ use glam::DVec2;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::grid::{Shapes, rasterise};
 use crate::memory;
 use crate::terrain::{Crs, Georeference};
 
 /// What a file of geometry must be.
 const EXPECTED: &str = "GeoJSON, in longitude and latitude (RFC 7946)";
-const CONVERT: &str = "convert it to GeoJSON in EPSG:4326";
-const REPROJECT: &str = "reproject the geometry to EPSG:4326, longitude before latitude";
 
 /// How much larger GeoJSON is in memory than in a file: a position of 13 characters is a list of numbers in a list.
 const TIMES_IN_MEMORY: u64 = 10;
@@ -31,9 +30,9 @@ const TIMES_IN_MEMORY: u64 = 10;
 /// The file cannot be read, is not GeoJSON, holds no geometry, names an unknown CRS, has latitude before longitude; the grid has no CRS.
 pub fn read_geojson(path: impl AsRef<Path>, georeference: &Georeference) -> Result<Shapes> {
     let path = path.as_ref();
-    let length = fs::metadata(path).map_or(0, |metadata| metadata.len());
-    memory::check(format!("the file {}", path.display()), length.saturating_mul(TIMES_IN_MEMORY))?;
-    let bytes = fs::read(path).map_err(|source| Error::io(path, source))?;
+    let mut file = File::open(path).map_err(|source| Error::io(path, source))?;
+    let mut bytes = Vec::new();
+    memory::read_rest(path, &mut file, TIMES_IN_MEMORY, &mut bytes)?;
     shapes_of(&bytes, georeference).map_err(|error| error.in_file(path))
 }
 
@@ -50,7 +49,9 @@ fn shapes_of(bytes: &[u8], georeference: &Georeference) -> Result<Shapes> {
         return Err(Error::argument("the file", "empty", "GeoJSON"));
     }
     if bytes.starts_with(&SHAPEFILE) {
-        return Err(Error::argument("the file", "a shapefile", EXPECTED).advise(CONVERT));
+        return Err(
+            Error::argument("the file", "a shapefile", EXPECTED).advise(Remedy::ConvertToGeoJson)
+        );
     }
     let text = decoded(bytes)?;
     let shapes = shapes_in_file(&text).map_err(not_geojson)?;
@@ -63,22 +64,23 @@ fn shapes_of(bytes: &[u8], georeference: &Georeference) -> Result<Shapes> {
 
 /// The text of a file in UTF-8, or in UTF-16 with a byte order mark, without the mark.
 fn decoded(bytes: &[u8]) -> Result<String> {
-    let utf16 = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
-        let units: Vec<u16> = bytes.chunks_exact(2).map(|two| unit([two[0], two[1]])).collect();
-        String::from_utf16(&units).map_err(not_geojson)
-    };
     match bytes {
-        [0xef, 0xbb, 0xbf, text @ ..] => {
-            str::from_utf8(text).map(str::to_owned).map_err(not_geojson)
-        }
         [0xff, 0xfe, text @ ..] => utf16(text, u16::from_le_bytes),
         [0xfe, 0xff, text @ ..] => utf16(text, u16::from_be_bytes),
-        text => str::from_utf8(text).map(str::to_owned).map_err(not_geojson),
+        [0xef, 0xbb, 0xbf, text @ ..] | text => {
+            str::from_utf8(text).map(str::to_owned).map_err(not_geojson)
+        }
     }
 }
 
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<String> {
+    let units: Vec<u16> = bytes.as_chunks().0.iter().copied().map(unit).collect();
+    String::from_utf16(&units).map_err(not_geojson)
+}
+
 fn not_geojson(cause: impl fmt::Display) -> Error {
-    Error::argument("the file", format!("not GeoJSON ({cause})"), EXPECTED).advise(CONVERT)
+    Error::argument("the file", format!("not GeoJSON ({cause})"), EXPECTED)
+        .advise(Remedy::ConvertToGeoJson)
 }
 
 /// The member of GeoJSON 2008 that RFC 7946 no longer has.
@@ -99,11 +101,13 @@ fn named_crs(text: &str) -> Result<Option<Crs>> {
     }
     let code = upper.rsplit([':', '/']).next().and_then(|code| code.parse().ok());
     match code.filter(|_| upper.contains("EPSG")) {
-        Some(code) => Ok(Some(Crs::from_epsg(code).map_err(|error| error.advise(REPROJECT))?)),
+        Some(code) => {
+            Ok(Some(Crs::from_epsg(code).map_err(|error| error.advise(Remedy::ConvertToGeoJson))?))
+        }
         None => {
             let found = if name.is_empty() { member.to_string() } else { name.to_owned() };
             Err(Error::argument("the member `crs`", found, "the name of an EPSG code")
-                .advise(REPROJECT))
+                .advise(Remedy::ConvertToGeoJson))
         }
     }
 }
@@ -116,9 +120,8 @@ fn on_grid(shapes: Shapes, crs: Option<&Crs>, georeference: &Georeference) -> Re
     let in_degrees = crs.is_none_or(Crs::is_geographic);
     if let Some(at) = shapes.vertices().find(|at| in_degrees && at.abs().max_element() > 360.0) {
         let found = format!("{}, {}", at.x, at.y);
-        return Err(
-            Error::argument("a position", found, "longitude and latitude").advise(REPROJECT)
-        );
+        return Err(Error::argument("a position", found, "longitude and latitude")
+            .advise(Remedy::ConvertToGeoJson));
     }
     let to_grid = |at: DVec2| match crs {
         Some(crs) => georeference.from_lonlat(crs.to_lonlat(at)?),
@@ -211,7 +214,7 @@ mod tests {
         let georeference = Georeference::new(frame, Crs::none());
         let contents: [&[u8]; 4] = [b"id,x,y", b"\x89PNG\xff", b"{\"a\": 1}", b"{\"type\": \"Poi"];
         for content in contents {
-            fs::write(&path, content).unwrap();
+            std::fs::write(&path, content).unwrap();
             let message = read_geojson(&path, &georeference).unwrap_err().to_string();
             assert!(message.contains("the file is not GeoJSON ("), "{message}");
         }

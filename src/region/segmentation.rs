@@ -112,10 +112,7 @@ impl Segmentation {
                 format!("{}, that of the nodes", cols * rows),
             ));
         }
-        memory::check(
-            format!("cutting {cols} × {rows} cells"),
-            memory::bytes(ranks.len(), BYTES_PER_NODE),
-        )?;
+        memory::check_cells("regions of", [cols, rows], BYTES_PER_NODE)?;
         let open: Vec<usize> =
             (0..ranks.len()).filter(|&i| field.is_open(i % cols, i / cols)).collect();
         if open.is_empty() {

@@ -152,10 +152,9 @@ impl Metric for Difference {
         // Checked before the work.
         let number = self.delta.number()?;
         let curvature_delta = self.curvature_delta.on(surface)?;
-        let (cols, rows) = (surface.cols(), surface.rows());
         let each = size_of::<Change>() + size_of::<Sym2>() + size_of::<f64>();
-        let what = format!("the {} metric over {cols} × {rows} cells", self.name());
-        memory::check(what, memory::bytes(cols.saturating_mul(rows), each))?;
+        let what = format!("the {} metric over", self.name());
+        memory::check_cells(&what, [surface.cols(), surface.rows()], each)?;
         let changes = self.changes_with_delta(curvature_delta, surface, control)?;
         let delta = match self.delta {
             Delta::Absolute(_) => number,

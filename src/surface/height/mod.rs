@@ -310,11 +310,8 @@ fn fit_bytes(frame: &GridFrame, heights: &[f64], plan: &FitPlan) -> u64 {
     const AROUND_VOIDS: usize = 26;
     let coefficients = frame.rows() * (plan.intervals[0] + plan.degree);
     let has_voids = heights.par_iter().any(|z| !z.is_finite());
-    let filled = if has_voids { memory::bytes(frame.nodes(), AROUND_VOIDS) } else { 0 };
-    filled.max(
-        memory::bytes(frame.nodes(), 8 * usize::from(has_voids))
-            + memory::bytes(coefficients, COEFFICIENT),
-    )
+    let [filled, continued] = if has_voids { [8, AROUND_VOIDS] } else { [0, 0] };
+    (frame.nodes() * continued).max(frame.nodes() * filled + coefficients * COEFFICIENT) as u64
 }
 
 /// Derivatives per node `z_c, z_r, …` become those along east and north: `∂x = ∂c/Δx`, `∂y = −∂r/Δy`.

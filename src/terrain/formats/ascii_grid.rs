@@ -194,8 +194,7 @@ fn cells<'a>(tokens: impl Iterator<Item = &'a [u8]>, grid: &Grid) -> Result<Vec<
         let expected = format!("{due}, that of {} × {} cells of the header", grid.cols, grid.rows);
         Error::argument("the number of heights", found, expected).advise(advice)
     };
-    let what = format!("a grid of {} × {} cells", grid.cols, grid.rows);
-    memory::check(what, memory::bytes(due, size_of::<f64>()))?;
+    memory::check_cells("a grid of", [grid.cols, grid.rows], size_of::<f64>())?;
     let mut heights = Vec::with_capacity(due);
     for token in tokens {
         let at = heights.len();

@@ -11,7 +11,7 @@ mod hgt;
 mod tiff;
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::Path;
 
 pub(super) use self::format::ReadMode;
@@ -34,17 +34,8 @@ pub(super) fn read(path: &Path, mode: ReadMode) -> Result<Raster> {
     let mut bytes = Vec::new();
     file.by_ref().take(Head::LENGTH).read_to_end(&mut bytes).map_err(io)?;
     let format = detect(path, &bytes)?;
-    let length = file.metadata().map_or(0, |metadata| metadata.len());
-    memory::check(format!("the file {}", path.display()), length)?;
-    match file.read_to_end(&mut bytes) {
-        Ok(_) => (format.read)(path, &bytes, mode),
-        Err(e) if e.kind() == io::ErrorKind::OutOfMemory => Err(Error::TooLarge {
-            what: format!("the file {}", path.display()),
-            bytes: length,
-            limit: None,
-        }),
-        Err(e) => Err(io(e)),
-    }
+    memory::read_rest(path, &mut file, 1, &mut bytes)?;
+    (format.read)(path, &bytes, mode)
 }
 
 /// The format of a file that begins with `bytes`, or what is wrong with it.

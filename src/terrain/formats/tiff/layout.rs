@@ -119,8 +119,7 @@ impl<'a> Layout<'a> {
     /// The samples of a band, row by row as stored; `absent` where a chunk is.
     pub(crate) fn band(&self, band: usize, absent: f64) -> TiffResult<Vec<f64>> {
         let cells = self.cols * self.rows;
-        let what = format!("a band of {} × {} cells", self.cols, self.rows);
-        memory::check(what, memory::bytes(cells, size_of::<f64>()))?;
+        memory::check_cells("a band of", [self.cols, self.rows], size_of::<f64>())?;
         // Only to see if there is room: zeroed memory costs nothing before it is used, and then the threads share the cost.
         if Vec::<f64>::new().try_reserve_exact(cells).is_err() {
             return Err(TiffError::TooLarge { bytes: (cells as u64).saturating_mul(8) });
