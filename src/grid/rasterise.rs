@@ -1,5 +1,8 @@
 //! The cells that geometry touches.
 
+use std::convert::Infallible;
+use std::ops::RangeInclusive;
+
 use glam::DVec2;
 
 use super::frame::GridFrame;
@@ -8,17 +11,30 @@ use super::tiling::Tiling;
 
 /// Marks, row-major, every cell that the shapes touch. The cells that a line runs through are connected by their sides, so that no step between
 /// neighbouring nodes, diagonal steps included, can cross the line between them.
+///
+/// On a periodic grid shapes go on over the seam: column `cols` is column 0.
 #[must_use]
 pub fn rasterise(frame: &GridFrame, shapes: &Shapes) -> Vec<bool> {
     let mut cells = Cells { frame, touched: vec![false; frame.nodes()] };
-    shapes.points.iter().for_each(|&point| cells.touch_along(point, point));
-    shapes.segments().for_each(|[a, b]| cells.touch_along(a, b));
-    // Of polygons also the cells whose centres lie inside.
-    let tiling = Tiling::new(frame.cols(), frame.rows());
-    for polygon in &shapes.polygons {
-        nodes_inside(polygon, &tiling, |col, row| cells.touched[frame.index(col, row)] = true);
+    for turn in turns(frame, shapes) {
+        let start = DVec2::new(f64::from(turn) * frame.cols() as f64, 0.0);
+        let Ok(shifted) = shapes.clone().try_map(|at| Ok::<_, Infallible>(at - start));
+        cells.touch_all(&shifted);
     }
     cells.touched
+}
+
+/// The turns around a periodic grid in which shapes have cells, counted from its first column; 0 on others.
+fn turns(frame: &GridFrame, shapes: &Shapes) -> RangeInclusive<i32> {
+    /// Nothing real goes around more often.
+    const MOST: f64 = 64.0;
+    if !frame.is_periodic() {
+        return 0..=0;
+    }
+    let turn = |at: DVec2| ((at.x + 0.5) / frame.cols() as f64).floor().clamp(-MOST, MOST) as i32;
+    let (west, east) =
+        shapes.vertices().map(turn).fold((0, 0), |(a, b), turn| (a.min(turn), b.max(turn)));
+    west..=east
 }
 
 struct Cells<'a> {
@@ -27,6 +43,18 @@ struct Cells<'a> {
 }
 
 impl Cells<'_> {
+    fn touch_all(&mut self, shapes: &Shapes) {
+        shapes.points.iter().for_each(|&point| self.touch_along(point, point));
+        shapes.segments().for_each(|[a, b]| self.touch_along(a, b));
+        // Of polygons also the cells whose centres lie inside.
+        let tiling = Tiling::new(self.frame.cols(), self.frame.rows());
+        for polygon in &shapes.polygons {
+            nodes_inside(polygon, &tiling, |col, row| {
+                self.touched[self.frame.index(col, row)] = true;
+            });
+        }
+    }
+
     /// Marks the cells along a segment, walking from cell to cell through their sides: Amanatides & Woo, A Fast Voxel Traversal
     /// Algorithm for Ray Tracing, Eurographics 1987.
     fn touch_along(&mut self, a: DVec2, b: DVec2) {
@@ -117,6 +145,22 @@ mod tests {
         assert_eq!(drawn[0], "#######.");
         assert_eq!(drawn[3], "###.###.");
         assert_eq!(drawn[6], "#######.");
+    }
+
+    #[test]
+    fn shapes_go_on_over_the_seam_of_a_periodic_grid() {
+        let origin = DVec2::new(-150.0, 20.0);
+        let frame = GridFrame::new(6, 3, origin, DVec2::new(60.0, 20.0), Ground::WGS84).unwrap();
+        let touched = |geometry: Geometry<f64>| -> String {
+            let cells = rasterise(&frame, &Shapes::from(geometry));
+            cells[6..12].iter().map(|&t| if t { '#' } else { '.' }).collect()
+        };
+        assert_eq!(touched(line(&[(4.0, 1.0), (7.0, 1.0)]).into()), "##..##");
+        assert_eq!(touched(line(&[(-1.0, 1.0), (-2.0, 1.0)]).into()), "....##");
+        let area = line(&[(4.6, 0.0), (6.2, 0.0), (6.2, 2.0), (4.6, 2.0), (4.6, 0.0)]);
+        assert_eq!(touched(Polygon::new(area, vec![]).into()), "#....#");
+        assert_eq!(touched(line(&[(-1000.0, 1.0), (0.0, 1.0)]).into()), "######");
+        touched(line(&[(-1e300, 1e300), (1e300, 1.0)]).into());
     }
 
     #[test]

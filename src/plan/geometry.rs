@@ -123,10 +123,7 @@ fn on_grid(shapes: Shapes, crs: Option<&Crs>, georeference: &Georeference) -> Re
         return Err(Error::argument("a position", found, "longitude and latitude")
             .advise(Remedy::ConvertToGeoJson));
     }
-    let to_grid = |at: DVec2| match crs {
-        Some(crs) => georeference.from_lonlat(crs.to_lonlat(at)?),
-        None => georeference.from_lonlat(at),
-    };
+    let to_grid = |at| vertex_on_grid(at, crs, georeference);
     let as_given = shapes.clone().try_map(to_grid);
     if as_given.as_ref().is_ok_and(|shapes| touches(shapes, georeference)) {
         return as_given;
@@ -139,6 +136,19 @@ fn on_grid(shapes: Shapes, crs: Option<&Crs>, georeference: &Georeference) -> Re
         }
         _ => as_given,
     }
+}
+
+/// Grid coordinates of a vertex. On a grid around the Earth columns run on beyond the last one as longitudes do beyond 180°, so that
+/// from 179° to 181° is a short way.
+fn vertex_on_grid(at: DVec2, crs: Option<&Crs>, georeference: &Georeference) -> Result<DVec2> {
+    let lonlat = crs.map_or(Ok(at), |crs| crs.to_lonlat(at))?;
+    let (mut on_grid, frame) = (georeference.from_lonlat(lonlat)?, georeference.frame());
+    if frame.is_periodic() {
+        let lon = if crs.is_none_or(Crs::is_geographic) { at.x } else { lonlat.x };
+        let (col, cols) = ((lon - frame.origin().x) / frame.step().x, frame.cols() as f64);
+        on_grid.x += ((col - on_grid.x) / cols).round() * cols;
+    }
+    Ok(on_grid)
 }
 
 /// All geometry of GeoJSON, in its own coordinates.
@@ -285,6 +295,21 @@ mod tests {
         let local = line(|map| map, &named("LOCAL:grid"));
         let message = shapes_of(local.as_bytes(), &georeference).unwrap_err().to_string();
         assert!(message.contains("LOCAL:grid") && message.contains("EPSG:4326"), "{message}");
+    }
+
+    #[test]
+    fn around_the_earth_lines_go_on_beyond_180_degrees() {
+        let crs = Crs::from_epsg(4326).unwrap();
+        let frame =
+            GridFrame::new(36, 3, DVec2::new(-175.0, 10.0), DVec2::splat(10.0), crs.ground());
+        let georeference = Georeference::new(frame.unwrap(), crs);
+        for (crs, text) in [("", "[[175,0],[185,0]]"), (r#","crs":null"#, "[[-185,0],[-175,0]]")] {
+            let text = format!(r#"{{"type":"LineString","coordinates":{text}{crs}}}"#);
+            let shapes = shapes_of(text.as_bytes(), &georeference).unwrap();
+            let touched = rasterise(georeference.frame(), &shapes);
+            let cols: Vec<_> = (0..36).filter(|col| touched[36 + col]).collect();
+            assert_eq!(cols, [0, 35], "{text}");
+        }
     }
 
     #[test]

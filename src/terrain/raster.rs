@@ -87,8 +87,9 @@ pub(super) fn note_of_fill(values: &[f64]) -> Option<String> {
     } else {
         return None;
     };
+    let written = if fill.abs() < 1e7 { fill.to_string() } else { format!("{fill:e}") };
     Some(format!(
-        "some cells hold {fill}, which looks like a void that is not declared; \
+        "some cells hold {written}, which looks like a void that is not declared; \
          declare it as the nodata value of the file"
     ))
 }
@@ -239,9 +240,10 @@ mod tests {
     fn fills_that_are_not_declared_are_noted() {
         let ground: Vec<f64> = (0..500).map(f64::from).collect();
         let with = |fill: f64| note_of_fill(&[&ground[..], &[fill, fill]].concat());
-        for fill in [32767.0, -32767.0, 65535.0, -9999.0, -999.0, 99999.0, 3.4e38, -3.4e38] {
+        for fill in [32767.0, -32767.0, 65535.0, -9999.0, -999.0, 99999.0] {
             assert!(with(fill).is_some_and(|note| note.contains(&fill.to_string())), "{fill}");
         }
+        assert!(with(-3.4e38).is_some_and(|note| note.contains("hold -3.4e38,")));
         // The Dead Sea, Everest, a rover's Moon in half metres, the sea's floor.
         let slope =
             |low: i32, high: i32| note_of_fill(&(low..high).map(f64::from).collect::<Vec<_>>());

@@ -4,7 +4,7 @@
 pub(super) fn without_shift_grids(definition: &str) -> (String, Option<String>) {
     /// What to replace, by what, and the caveat. NAD27: EPSG transformation 1173. NZGD49: the
     /// definitions give a seven-parameter shift besides the grid.
-    const SHIFTS: [(&str, &str, &str); 3] = [
+    const SHIFTS: [(&str, &str, &str); 4] = [
         (
             "+datum=NAD27",
             "+ellps=clrk66 +towgs84=-8,160,176",
@@ -20,6 +20,12 @@ pub(super) fn without_shift_grids(definition: &str) -> (String, Option<String>) 
             "+proj=krovak",
             "+proj=krovak",
             "longitudes and latitudes from the Krovak projection are about 8 m off",
+        ),
+        (
+            // The oblique Mercator projection that stands for Laborde's.
+            "+proj=omerc +lat_0=-18.9 +lonc=44.1",
+            "+proj=omerc +lat_0=-18.9 +lonc=44.1",
+            "longitudes and latitudes from the Laborde projection are about 20 m off",
         ),
     ];
     match SHIFTS.iter().find(|(grid, ..)| definition.contains(grid)) {

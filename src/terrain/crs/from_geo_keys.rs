@@ -28,7 +28,7 @@ impl Crs {
             (Some(2) | None, [None, Some(code)]) => {
                 Self::from_epsg(code).or_else(|e| keys.user_geographic_crs().map_err(|_| e))?
             }
-            (Some(1 | 2), _) if keys.esri_text().is_some() => keys.esri_crs()?,
+            _ if keys.esri_text().is_some() => keys.esri_crs()?,
             (Some(1), _) => keys.user_projected_crs()?,
             (Some(2), _) => keys.user_geographic_crs()?,
             _ => match keys.named_crs() {
@@ -156,7 +156,7 @@ impl GeoKeys {
             self.short(key).filter(|c| (base..base + 1000).contains(c)).map(|c| c - base + 4000)
         };
         // As GDAL has it, the prime meridian of a geographic CRS with a code is that of the code.
-        if let Some(known) = coded(key::GEOGRAPHIC_CRS, 4000).and_then(datum_of_crs) {
+        if let Some(known) = self.short(key::GEOGRAPHIC_CRS).and_then(datum_of_crs) {
             return Ok(Some((known, None)));
         }
         let meridian = self.prime_meridian()?;
@@ -177,7 +177,20 @@ impl GeoKeys {
         };
         let on_earth = semi_major.is_none_or(|a| (a - 6_371_000.0).abs() < 20_000.0);
         let caveat = "the file does not name its datum; longitudes and latitudes may be some hundred metres off";
-        Ok(ellipsoid.map(|text| (text + &meridian, on_earth.then(|| caveat.to_owned()))))
+        let shift = self.datum_shift();
+        let caveat = (on_earth && shift.is_empty()).then(|| caveat.to_owned());
+        Ok(ellipsoid.map(|text| (text + &shift + &meridian, caveat)))
+    }
+
+    /// ` +towgs84=` and the parameters of the datum shift; empty without them.
+    fn datum_shift(&self) -> String {
+        match self.doubles_of(key::TO_WGS84) {
+            Some(shift) if matches!(shift.len(), 3 | 7) && shift.iter().all(|x| x.is_finite()) => {
+                let parameters: Vec<_> = shift.iter().map(f64::to_string).collect();
+                format!(" +towgs84={}", parameters.join(","))
+            }
+            _ => String::new(),
+        }
     }
 
     /// ` +pm=` and the longitude of the prime meridian; empty for Greenwich.
@@ -195,8 +208,20 @@ impl GeoKeys {
         Ok(if lon == 0.0 { String::new() } else { format!(" +pm={lon}") })
     }
 
+    /// The conversion of a UTM zone in PROJ.4 notation: EPSG 16000 + n in the north, 16100 + n in the south.
+    fn utm_zone(&self) -> Option<String> {
+        match self.short(key::CONVERSION)? {
+            code @ 16001..=16060 => Some(format!("+proj=utm +zone={}", code - 16000)),
+            code @ 16101..=16160 => Some(format!("+proj=utm +zone={} +south", code - 16100)),
+            _ => None,
+        }
+    }
+
     /// The map projection in PROJ.4 notation, for the methods that DEMs come in.
     fn conversion(&self, metres_per_unit: f64, degrees_per_unit: f64) -> Option<String> {
+        if let Some(zone) = self.utm_zone() {
+            return Some(zone);
+        }
         let first = |keys: &[u16]| keys.iter().find_map(|k| self.double(*k));
         let angle = |keys: &[u16]| first(keys).map(|angle| angle * degrees_per_unit);
         let lat_0 = angle(&key::ORIGIN_LAT).unwrap_or(0.0);
@@ -207,10 +232,12 @@ impl GeoKeys {
         let true_scale = parallel_1.map(|lat| format!(" +lat_ts={lat}")).unwrap_or_default();
         let method = match self.short(key::METHOD)? {
             1 => format!("+proj=tmerc +lat_0={lat_0}"),
-            3 => {
+            // False easting and northing are those of the natural origin, or of the centre.
+            code @ (3 | 9815) => {
                 let gamma = angle(&[key::RECTIFIED_GRID_ANGLE]).or(azimuth)?;
                 let (alpha, center) = (azimuth?, format!("+lat_0={lat_0} +lonc={lon_0}"));
-                format!("+proj=omerc {center} +alpha={alpha} +gamma={gamma}")
+                let origin = if code == 3 { " +no_uoff" } else { "" };
+                format!("+proj=omerc {center} +alpha={alpha} +gamma={gamma}{origin}")
             }
             7 => format!("+proj=merc{true_scale}"),
             8 => format!("+proj=lcc +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
@@ -218,11 +245,18 @@ impl GeoKeys {
             10 => format!("+proj=laea +lat_0={lat_0}"),
             11 => format!("+proj=aea +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?),
             12 => format!("+proj=aeqd +lat_0={lat_0}"),
+            13 => {
+                format!("+proj=eqdc +lat_1={} +lat_2={} +lat_0={lat_0}", parallel_1?, parallel_2?)
+            }
             14 => format!("+proj=stere +lat_0={lat_0}"),
             15 => format!("+proj=stere +lat_0={} +lat_ts={lat_0}", 90f64.copysign(lat_0)),
             16 => format!("+proj=sterea +lat_0={lat_0}"),
             18 => format!("+proj=cass +lat_0={lat_0}"),
+            19 => format!("+proj=gnom +lat_0={lat_0}"),
+            20 => "+proj=mill".to_owned(),
+            21 => format!("+proj=ortho +lat_0={lat_0}"),
             22 => format!("+proj=poly +lat_0={lat_0}"),
+            23 => "+proj=robin".to_owned(),
             28 => format!("+proj=cea{true_scale}"),
             17 => format!("+proj=eqc{true_scale} +lat_0={lat_0}"),
             24 => "+proj=sinu".to_owned(),
@@ -363,6 +397,26 @@ mod tests {
         assert_near(ours.to_lonlat(at).unwrap(), known.to_lonlat(at).unwrap(), 1e-7);
         let unknown = [(1024, 2), (2048, 32767), (2051, 8999), (2056, 7011)];
         assert!(Crs::from_geo_keys(keys(&unknown, &[], "")).is_err());
+    }
+
+    #[test]
+    fn zones_and_datum_shifts_without_a_code_count() {
+        let at = DVec2::new(1.6e6, 1.6e7);
+        let foot = 1200.0 / 3937.0;
+        let zone = [(1024, 1), (2050, 6326), (3072, 32767), (3074, 16033), (3076, 9003)];
+        let ours = Crs::from_geo_keys(keys(&zone, &[], "")).unwrap().to_lonlat(at).unwrap();
+        let known = Crs::from_epsg(32633).unwrap().to_lonlat(at * foot).unwrap();
+        assert_near(ours, known, 1e-9);
+        // GeogTOWGS84GeoKey of seven numbers.
+        let airy = [(1024, 2), (2048, 32767), (2056, 7001)];
+        let mut keys = keys(&airy, &[(2062, 446.448)], "");
+        keys.directory[4 * 4 + 2] = 7;
+        keys.doubles.extend([-125.157, 542.06, 0.15, 0.247, 0.842, -20.489]);
+        let crs = Crs::from_geo_keys(keys).unwrap();
+        let at = DVec2::new(-1.0, 52.0);
+        let known = Crs::from_epsg(4277).unwrap().to_lonlat(at).unwrap();
+        assert_near(crs.to_lonlat(at).unwrap(), known, 1e-5);
+        assert_eq!(crs.caveat(), None);
     }
 
     #[test]

@@ -33,7 +33,10 @@ impl Crs {
             let is_known = known.iter().any(|key| text.contains(key));
             let unknown_datum = (!is_known).then(|| "without a name".to_owned());
             let definition = Definition { proj4: text.to_owned(), unknown_datum };
-            return Self::from_proj(text, text).map(|crs| definition.crs(text).unwrap_or(crs));
+            return match Self::from_proj(text, text) {
+                Ok(crs) => Ok(definition.crs(text).unwrap_or(crs)),
+                Err(error) => Err(error.advise(Remedy::Reproject)),
+            };
         }
         if text.get(..10).is_some_and(|word| word.eq_ignore_ascii_case("projection")) {
             return Self::from_arc_info(text);

@@ -32,8 +32,11 @@ pub(in crate::terrain) mod key {
     pub(crate) const SEMI_MINOR: u16 = 2058;
     pub(crate) const INVERSE_FLATTENING: u16 = 2059;
     pub(crate) const PRIME_MERIDIAN_LON: u16 = 2061;
+    /// Three or seven parameters of the shift to WGS84 (libgeotiff).
+    pub(crate) const TO_WGS84: u16 = 2062;
     pub(crate) const PROJECTED_CRS: u16 = 3072;
     pub(crate) const PROJECTED_CITATION: u16 = 3073;
+    pub(crate) const CONVERSION: u16 = 3074;
     pub(crate) const METHOD: u16 = 3075;
     pub(crate) const LINEAR_UNITS: u16 = 3076;
     pub(crate) const LINEAR_UNIT_SIZE: u16 = 3077;
@@ -89,8 +92,13 @@ impl GeoKeys {
     }
 
     pub(super) fn double(&self, key: u16) -> Option<f64> {
-        let (location, _, offset) = self.find(key)?;
-        (location == 34736).then(|| self.doubles.get(usize::from(offset)).copied()).flatten()
+        self.doubles_of(key)?.first().copied()
+    }
+
+    pub(super) fn doubles_of(&self, key: u16) -> Option<&[f64]> {
+        let (location, count, offset) = self.find(key)?;
+        let start = usize::from(offset);
+        (location == 34736).then(|| self.doubles.get(start..start + count)).flatten()
     }
 
     pub(super) fn text(&self, key: u16) -> Option<Cow<'_, str>> {

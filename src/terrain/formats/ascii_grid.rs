@@ -27,8 +27,8 @@ fn begins_with_keyword(head: &Head) -> bool {
 }
 
 fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
-    let beside = Auxiliary::beside(path);
-    let nodata = beside.nodata(0).and_then(|text| text.parse().ok());
+    let auxiliary = Auxiliary::of(path);
+    let nodata = auxiliary.nodata(0).and_then(|text| text.parse().ok());
     let (header, grid, heights) = parse(bytes, nodata).map_err(|error| error.in_file(path))?;
     let mut notes: Vec<String> = note_of_fill(&heights).into_iter().collect();
     if header.nodata.is_none() && heights.iter().any(|h| h.is_nan()) {
@@ -41,7 +41,7 @@ fn read(path: &Path, bytes: &[u8], _: ReadMode) -> Result<Raster> {
         rows: grid.rows,
         origin: grid.origin,
         step: DVec2::new(grid.cell.x, -grid.cell.y),
-        crs: crs_beside(path)?,
+        crs: crs_of(path, &auxiliary)?,
         bands: vec![heights],
         source: Source {
             format: FORMAT.name.to_owned(),
@@ -221,16 +221,16 @@ fn number(token: &[u8]) -> Option<f64> {
     text.parse().ok().or_else(|| text.contains(',').then(|| text.replace(',', ".").parse().ok())?)
 }
 
-/// The CRS that a `.prj` file beside the grid describes.
-fn crs_beside(path: &Path) -> Result<Crs> {
+/// The CRS that a `.prj` file next to the grid describes, else a `.aux.xml`.
+fn crs_of(path: &Path, auxiliary: &Auxiliary) -> Result<Crs> {
     for extension in ["prj", "PRJ"] {
-        let beside = path.with_extension(extension);
-        if let Ok(wkt) = fs::read(&beside) {
-            return Crs::from_text(&String::from_utf8_lossy(&wkt))
-                .map_err(|e| e.unsupported_in(&beside));
+        let prj = path.with_extension(extension);
+        if let Ok(text) = fs::read(&prj) {
+            let text = String::from_utf8_lossy(&text);
+            return Crs::from_text(&text).map_err(|e| e.unsupported_in(&prj));
         }
     }
-    Ok(Crs::none())
+    Ok(auxiliary.crs().unwrap_or_else(Crs::none))
 }
 
 #[cfg(test)]

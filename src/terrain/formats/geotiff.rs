@@ -34,14 +34,17 @@ fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
     refuse_pictures(image, &layout)?;
 
     let keys = geo_keys(image)?;
-    let beside = Auxiliary::beside(path);
+    let auxiliary = Auxiliary::of(path);
     let metadata = image.text(tag::GDAL_METADATA)?.unwrap_or_default();
     let unit = match mode {
-        ReadMode::Heights => height_unit(&keys, &metadata, &beside)?,
+        ReadMode::Heights => height_unit(&keys, &metadata, &auxiliary)?,
         ReadMode::Bands => None,
     };
     let Placement { origin, step } = place(path, image, &keys, layout.rows, &mut notes)?;
-    let crs = Crs::from_geo_keys(keys).map_err(TiffError::Crs)?;
+    let crs = match auxiliary.crs() {
+        Some(crs) => crs,
+        None => Crs::from_geo_keys(keys).map_err(TiffError::Crs)?,
+    };
     let alpha = alpha_band(image, &layout)?;
     let count = layout.bands - usize::from(alpha.is_some());
     if mode == ReadMode::Heights && count > 1 {
@@ -52,15 +55,15 @@ fn read_image(path: &Path, bytes: &[u8], mode: ReadMode) -> TiffResult<Raster> {
         ReadMode::Bands => 0..count,
     };
     let nodata = image.text(tag::GDAL_NODATA)?.map(|t| t.trim().to_owned());
-    let nodata = beside.nodata(0).map(str::to_owned).or(nodata);
+    let nodata = auxiliary.nodata(0).map(str::to_owned).or(nodata);
     let mask = Mask::new(path, &images, &layout, alpha.filter(|_| nodata.is_none()))?;
     let absent = if nodata.is_some() { f64::NAN } else { 0.0 };
     let bands = bands
         .map(|band| {
             let mut values = layout.band(band, absent)?;
-            let nodata = beside.nodata(band).or(nodata.as_deref());
+            let nodata = auxiliary.nodata(band).or(nodata.as_deref());
             void_nodata(&mut values, layout.sample, nodata, &mask, &mut notes);
-            scale(&mut values, &metadata, &beside, band)?;
+            scale(&mut values, &metadata, &auxiliary, band)?;
             Ok(values)
         })
         .collect::<TiffResult<_>>()?;
@@ -263,10 +266,16 @@ fn void_nodata(
 /// Turns nodata, infinite and masked cells of a part, which begins at cell `first`, to `NaN`.
 fn void_part(values: &mut [f64], first: usize, nodata: Option<f64>, mask: &Mask) {
     for (i, value) in values.iter_mut().enumerate() {
-        if Some(*value) == nodata || value.is_infinite() || mask.is_void(first + i) {
+        let is_nodata = nodata.is_some_and(|nodata| is_nodata(*value, nodata));
+        if is_nodata || value.is_infinite() || mask.is_void(first + i) {
             *value = f64::NAN;
         }
     }
+}
+
+/// Equal but for rounding in text, as GDAL has it (`ARE_REAL_EQUAL`).
+fn is_nodata(value: f64, nodata: f64) -> bool {
+    value == nodata || (value - nodata).abs() < 1e-10 * nodata.abs()
 }
 
 /// Rasters of the size of the image that are 0 where a cell is void.
@@ -343,13 +352,15 @@ fn metadata_number(metadata: &str, role: &str, band: usize) -> TiffResult<Option
 }
 
 /// Turns stored numbers `v` into what they stand for: `scale · v + offset`.
-fn scale(values: &mut [f64], metadata: &str, beside: &Auxiliary, band: usize) -> TiffResult<()> {
-    let number = |role| match beside.number(band, role) {
-        Some(number) => Ok(Some(number)),
-        None => metadata_number(metadata, role, band),
+fn scale(values: &mut [f64], metadata: &str, auxiliary: &Auxiliary, band: usize) -> TiffResult<()> {
+    let scale = match auxiliary.scale(band) {
+        Some(scale) => scale,
+        None => metadata_number(metadata, "scale", band)?.unwrap_or(1.0),
     };
-    let scale = number("scale")?.unwrap_or(1.0);
-    let offset = number("offset")?.unwrap_or(0.0);
+    let offset = match auxiliary.offset(band) {
+        Some(offset) => offset,
+        None => metadata_number(metadata, "offset", band)?.unwrap_or(0.0),
+    };
     if (scale, offset) != (1.0, 0.0) {
         values.par_iter_mut().for_each(|v| *v = scale * *v + offset);
     }
@@ -360,9 +371,9 @@ fn scale(values: &mut [f64], metadata: &str, beside: &Auxiliary, band: usize) ->
 fn height_unit(
     keys: &GeoKeys,
     metadata: &str,
-    beside: &Auxiliary,
+    auxiliary: &Auxiliary,
 ) -> TiffResult<Option<(&'static str, f64)>> {
-    let of_band = beside.unit(0).or_else(|| metadata_item(metadata, "unittype", 0));
+    let of_band = auxiliary.unit(0).or_else(|| metadata_item(metadata, "unittype", 0));
     if let Some(text) = of_band.filter(|t| !t.is_empty()) {
         return match named_unit(text) {
             Some(unit) => Ok(Some(unit)),
