@@ -67,6 +67,12 @@ impl DistanceMap {
         self.values.check()
     }
 
+    /// How many nodes of a solve in high accuracy were left at first order, because the metric or the costs turn or jump within a cell there.
+    #[must_use]
+    pub fn rough_nodes(&self) -> u32 {
+        self.correction.as_ref().map_or(0, Correction::rough_nodes)
+    }
+
     /// Memory that the map takes per node: tensors, values and, in high accuracy, two rounds of corrections.
     #[must_use]
     pub fn bytes_per_node(&self) -> usize {

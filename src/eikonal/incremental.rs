@@ -21,7 +21,7 @@ use super::stencil::UNREACHED;
 use super::tensor_field::TensorField;
 use crate::control::Control;
 use crate::error::Result;
-use crate::grid::tiling::AREA;
+use crate::grid::tiling::{AREA, SIDE};
 use crate::linalg::Sym2;
 use crate::metric::MetricField;
 
@@ -80,11 +80,22 @@ impl Solver {
         control: &Control,
     ) -> Result<DistanceMap> {
         let set = |field: &mut TensorField| {
-            let set = |&(col, row, tensor): &_| {
+            for &(col, row, tensor) in nodes {
                 field.set(col, row, tensor)?;
-                Ok(field.tiling.place(col, row))
+            }
+            // Where steps are priced by cells, those from the nodes around have changed, too.
+            let reach = isize::from(field.has_cells());
+            let around = |&(col, row, _): &(usize, usize, _)| {
+                let offsets =
+                    (-reach..=reach).flat_map(move |j| (-reach..=reach).map(move |i| (i, j)));
+                offsets.map(move |(i, j)| (col as isize + i, row as isize + j))
             };
-            nodes.iter().map(set).collect()
+            let nodes = nodes.iter().flat_map(around);
+            let nodes = nodes.filter_map(|(col, row)| field.tiling.node(col, row));
+            let mut places: Vec<_> = nodes.map(|(c, r)| field.tiling.place(c, r)).collect();
+            places.sort_unstable();
+            places.dedup();
+            Ok(places)
         };
         self.solve_after(set, map, stop, control)
     }
@@ -142,15 +153,19 @@ impl Solver {
     }
 }
 
-/// Tile and place in it of the nodes whose tensors differ.
+/// Tile and place in it of the nodes that are closed, or from which a step costs, otherwise than before.
 fn differences(old: &TensorField, new: &TensorField) -> Vec<(usize, usize)> {
     let differ = |tile: usize| {
-        let (old, new) = (old.tensors(tile), new.tensors(tile));
-        let same = old.xx == new.xx && old.xy == new.xy && old.det == new.det;
-        let differs = move |&i: &usize| {
-            (old.xx[i], old.xy[i], old.det[i]) != (new.xx[i], new.xy[i], new.det[i])
-        };
+        let same = old.prices(tile).are_like(&new.prices(tile));
         let places = if same { 0..0 } else { 0..AREA };
+        let differs = move |&place: &usize| {
+            let (col, row) = old.tiling.node_at(tile, place);
+            let [cols, rows] = old.tiling.size(tile);
+            let is_inside = place % SIDE < cols && place / SIDE < rows;
+            is_inside
+                && (old.is_open(col, row) != new.is_open(col, row)
+                    || old.steps(col, row) != new.steps(col, row))
+        };
         places.filter(differs).map(move |place| (tile, place))
     };
     (0..old.tiling.tiles()).into_par_iter().with_min_len(64).flat_map_iter(differ).collect()

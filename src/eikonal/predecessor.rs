@@ -1,21 +1,14 @@
 //! Where each value came from.
 
-#![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
-
 use glam::DVec2;
 use rayon::prelude::*;
 
 use super::factors::Factors;
 use super::schedule::memory::MemoryStore;
 use super::stencil::UNREACHED;
-use super::stencil::foot;
-use super::stencil::ring::{RING, for_each_triangle, ring_of, rings, without_cut_corners};
+use super::stencil::foot::{self, Foot};
+use super::stencil::ring::RING;
 use super::tensor_field::TensorField;
-use super::tile::coefficients::{Coefficients, LaneLimits, factoring_terms, line_tensors};
-use super::tile::{Block, Tile};
-use crate::grid::tiling::SIDE;
-use crate::linalg::lanes::{lanes, least};
-use crate::linalg::simd::{self, Kernel};
 
 /// Least value of a node over its ring, with the step to the point of the ring at which it is attained, see [`foot::best_foot`].
 pub(super) fn best_foot(
@@ -25,12 +18,25 @@ pub(super) fn best_foot(
     col: usize,
     row: usize,
 ) -> Option<(f64, DVec2)> {
-    let metric = field.metric(col, row)?;
-    let ring = RING.map(|(i, j)| {
+    if !field.is_open(col, row) {
+        return None;
+    }
+    let ring = ring_values(field, value, col, row);
+    let foot = foot::best_foot(ring, factors.terms(field, col, row), &field.steps(col, row))?;
+    Some((foot.value, foot.step()))
+}
+
+/// The values on the ring of a node; infinite beyond the grid.
+fn ring_values(
+    field: &TensorField,
+    value: impl Fn(usize, usize) -> f32,
+    col: usize,
+    row: usize,
+) -> [f32; 8] {
+    RING.map(|(i, j)| {
         let node = field.tiling.node(col as isize + i as isize, row as isize + j as isize);
         node.map_or(f32::INFINITY, |(c, r)| value(c, r))
-    });
-    foot::best_foot(ring, factors.terms(field, col, row), metric)
+    })
 }
 
 /// No place on the ring.
@@ -42,106 +48,31 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 pub(super) fn predecessors(field: &TensorField, factors: &Factors, store: &MemoryStore) -> Vec<u8> {
     let tiling = field.tiling;
     let mut predecessors = vec![NOWHERE; tiling.cols * tiling.rows];
-    let bands = predecessors.par_chunks_mut((tiling.cols * SIDE).max(1)).enumerate();
-    bands.for_each_init(Block::default, |block, (y, band)| {
-        for x in 0..tiling.across {
-            let index = y * tiling.across + x;
-            let factor = factors.of_tile(index).map(|factor| (factor, tiling.first(index)));
-            let tile = Tile { tensors: field.tensors(index), factor, tolerance: 0.0, seeds: None };
-            store.values.read(index, block);
-            let [cols, _] = tiling.size(index);
-            let found = simd::dispatch(TilePredecessors { block, tile: &tile });
-            for (line, found) in band.chunks_mut(tiling.cols).zip(found) {
-                line[x * SIDE..][..cols].copy_from_slice(&found[..cols]);
+    let value = |col: usize, row: usize| {
+        let (tile, place) = tiling.place(col, row);
+        store.values.at(tile, place)
+    };
+    let rows = predecessors.par_chunks_mut(tiling.cols.max(1)).enumerate();
+    rows.for_each(|(row, line)| {
+        for (col, place) in line.iter_mut().enumerate() {
+            let own = value(col, row);
+            if own < UNREACHED {
+                let ring = ring_values(field, value, col, row);
+                let terms = factors.terms(field, col, row);
+                let foot = foot::best_foot(ring, terms, &field.steps(col, row));
+                *place = foot.map_or(NOWHERE, |foot| nearer_end(&foot, own, &ring));
             }
         }
     });
     predecessors
 }
 
-/// Finds the predecessors of the nodes of a tile.
-struct TilePredecessors<'a> {
-    block: &'a Block,
-    tile: &'a Tile<'a>,
-}
-
-impl Kernel for TilePredecessors<'_> {
-    type Output = [[u8; SIDE]; SIDE];
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let mut predecessors = [[NOWHERE; SIDE]; SIDE];
-        for row in 0..SIDE {
-            let line = line_predecessors(self.block, self.tile, row);
-            for i in 0..SIDE {
-                predecessors[row][i] = line[i] as u8;
-            }
-        }
-        predecessors
-    }
-}
-
-/// The predecessors of the nodes of a row of a tile.
-#[inline(always)]
-fn line_predecessors(block: &Block, tile: &Tile<'_>, row: usize) -> [u32; SIDE] {
-    let (mut k, mut limits) = (Coefficients::CLOSED, LaneLimits::default());
-    let tensors = line_tensors(tile, row, false);
-    k.prepare(tile, row, false, &tensors, &mut limits);
-    let mut terms = [[0f32; SIDE]; 8];
-    factoring_terms(tile, row, false, &tensors, &mut terms, &mut limits);
-    let [xxs, xys, dets] = tensors;
-    let rings = rings([&block[row], &block[row + 1], &block[row + 2]], 1);
-    let own = lanes(&block[row + 1], 1);
-    let mut predecessors = [u32::from(NOWHERE); SIDE];
-    for i in 0..SIDE {
-        let ring = without_cut_corners(ring_of(&rings, i));
-        let mut g = ring;
-        for k in 0..8 {
-            g[k] += terms[k][i];
-        }
-        let mut best = Best { value: UNREACHED, place: u32::from(NOWHERE) };
-        for place in 0..8 {
-            let through = g[place] + k.step[place % 4][i];
-            best.offer(through, place as u32);
-        }
-        let (xx, xy, det) = (xxs[i], xys[i], dets[i]);
-        let yy = (det + xy * xy) / xx;
-        for_each_triangle!(t => {
-            let (a, b) = (t.a, t.b);
-            let through = k.closed_form(t, i).through(g[a], g[b]);
-            let (s, q) = if t.along_y { (yy, xx) } else { (xx, yy) };
-            let is_near_b =
-                g[b] - g[a] < middle_slope_limit(s, q, if t.falling { -xy } else { xy }, det);
-            let (a_lower, b_lower) = (ring[a] < own[i], ring[b] < own[i]);
-            let to_b = (is_near_b & (b_lower | !a_lower)) | (b_lower & !a_lower);
-            let to = if to_b { b as u32 } else { a as u32 };
-            best.offer(through, to);
-        });
-        predecessors[i] = if own[i] < UNREACHED { best.place } else { u32::from(NOWHERE) };
-    }
-    predecessors
-}
-
-/// The best value so far and the place on the ring that it leads to.
-struct Best {
-    value: f32,
-    place: u32,
-}
-
-impl Best {
-    #[inline(always)]
-    fn offer(&mut self, value: f32, place: u32) {
-        self.place = if value < self.value { place } else { self.place };
-        self.value = least(value, self.value);
-    }
-}
-
-/// `−mᵀMw/‖m‖` at the middle `m` of a segment, with `D = [s β; β q]` as in
-/// [`ClosedForm`](super::stencil::segment::ClosedForm). Where `d = gb − ga` is less, the sum still falls at the middle, and its minimum is
-/// nearer to `b`.
-#[inline(always)]
-fn middle_slope_limit(s: f32, q: f32, beta: f32, det: f32) -> f32 {
-    (beta - 0.5 * s) / ((q - beta + 0.25 * s) * det).sqrt()
+/// The end nearer to the foot of a node, unless only the other is lower than the node.
+fn nearer_end(foot: &Foot, own: f32, ring: &[f32; 8]) -> u8 {
+    let [a, b] = foot.ends;
+    let (nearer, other) = if foot.theta > 0.5 { (b, a) } else { (a, b) };
+    let is_end = foot.theta == 0.0 || foot.theta == 1.0;
+    if !is_end && ring[nearer] >= own && ring[other] < own { other as u8 } else { nearer as u8 }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::schedule::memory::MemoryStore;
 use super::schedule::tile_store::TileStore;
 use super::schedule::values::Values;
 use super::start::StartRegion;
-use super::stencil::ring::RING;
+use super::stencil::ring::{RING, TRIANGLES};
 use super::tensor_field::TensorField;
 use super::tile::Limits;
 use super::tile::coefficients::ceiling;
@@ -73,10 +73,15 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
     })
 }
 
-/// Length of the shortest step from an open node to its ring.
+/// Cost of the cheapest step from a node to its ring.
 fn shortest(field: &TensorField, col: usize, row: usize) -> f32 {
-    let metric = field.metric(col, row).unwrap_or_default();
-    RING.iter().fold(f32::INFINITY, |least, &(i, j)| {
-        least.min(metric.norm(DVec2::new(i.into(), j.into())) as f32)
-    })
+    let steps = field.steps(col, row);
+    let triangles = TRIANGLES.iter().zip(steps.metrics);
+    let costs = triangles.flat_map(|(t, metric)| {
+        [t.a, t.b].map(|k| {
+            let by = DVec2::new(RING[k].0.into(), RING[k].1.into());
+            metric.map_or(f64::INFINITY, |m| 0.5 * (steps.own + steps.ring[k]) * m.norm(by))
+        })
+    });
+    costs.fold(f64::INFINITY, f64::min) as f32
 }

@@ -227,6 +227,7 @@ struct Vicinity<'a> {
     /// Column and row of the first node.
     first: [isize; 2],
     metrics: [[Option<Sym2>; VICINITY_SIDE]; VICINITY_SIDE],
+    costs: [[f64; VICINITY_SIDE]; VICINITY_SIDE],
 }
 
 impl<'a> Vicinity<'a> {
@@ -236,17 +237,40 @@ impl<'a> Vicinity<'a> {
         let place = |axis: usize, i: usize| first[axis].saturating_add_unsigned(i);
         let metric = |col: usize, row: usize| field.metric_of(place(0, col), place(1, row));
         let metrics = from_fn(|row| from_fn(|col| metric(col, row)));
-        Self { tiling: &field.tiling, first, metrics }
+        let cost = |col: usize, row: usize| field.cost(place(0, col), place(1, row)).unwrap_or(1.0);
+        let costs = from_fn(|row| from_fn(|col| cost(col, row)));
+        Self { tiling: &field.tiling, first, metrics, costs }
     }
 
     fn metric(&self, col: isize, row: isize) -> Option<Sym2> {
+        Some(self.metric_and_cost(col, row)?.0)
+    }
+
+    fn metric_and_cost(&self, col: isize, row: isize) -> Option<(Sym2, f64)> {
         let (col, row) = (col.wrapping_sub(self.first[0]), row.wrapping_sub(self.first[1]));
-        *self.metrics.get(row as usize)?.get(col as usize)?
+        let metric = *self.metrics.get(row as usize)?.get(col as usize)?;
+        Some((metric?, self.costs[row as usize][col as usize]))
     }
 
     /// As [`TensorField::metric_at`].
     fn metric_at(&self, at: DVec2) -> Option<Sym2> {
-        self.tiling.bilinear(at, |col, row| self.metric(col, row))
+        let cost = |col, row| Some(Sym2::new(self.metric_and_cost(col, row)?.1, 0.0, 0.0));
+        let rest = |col, row| {
+            let (metric, cost) = self.metric_and_cost(col, row)?;
+            Some(metric * cost.powi(-2))
+        };
+        let cost = self.tiling.bilinear(at, cost)?.xx;
+        Some(self.tiling.bilinear(at, rest)? * (cost * cost))
+    }
+
+    /// No path from `a` to `b` among the nodes around them is shorter: the least length of `b − a` under the metric of any of these.
+    fn least_length(&self, a: DVec2, b: DVec2) -> f64 {
+        let (from, to) = ((a.min(b) - 1.0).floor(), (a.max(b) + 1.0).ceil());
+        let columns = from.x as isize..=to.x as isize;
+        let nodes = (from.y as isize..=to.y as isize)
+            .flat_map(|row| columns.clone().map(move |col| (col, row)));
+        let lengths = nodes.filter_map(|(col, row)| Some(self.metric(col, row)?.norm(b - a)));
+        lengths.fold(f64::INFINITY, f64::min)
     }
 
     /// The derivative of the metric at a point along a unit vector, by a central difference; zero next to walls.
@@ -270,22 +294,31 @@ impl<'a> Vicinity<'a> {
 
 /// Length of the geodesic between two points nearby, in sight of each other, in stored units: `d² = E − B` up to fourth order in the
 /// distance, with the energy `E = ∫ vᵀMv` of the chord `v`, less what bending saves, `B = ‖Γ(v, v)‖²_D/12` with the Christoffel
-/// symbols `Γ` (of the first kind) at its middle.
+/// symbols `Γ` (of the first kind) at its middle. Where the metric varies too much along the chord for that, the cost of the chord as a step of
+/// the update has it, if it is no longer than one; `None` farther away, where the update gives a better value.
 fn geodesic_length(vicinity: &Vicinity<'_>, a: DVec2, b: DVec2) -> Option<f64> {
-    /// Largest share `B/E`: the expansion does not hold beyond.
+    /// Largest share `B/E`, and largest ratio of the lengths of the chord under the metrics along it: the expansion does not hold beyond.
     const MAX_SHARE: f64 = 0.2;
+    const MAX_RATIO: f64 = 1.5;
     let v = b - a;
     let weights = [1.0, 4.0, 2.0, 4.0, 1.0];
     let mut energy = 0.0;
+    let (mut least, mut most) = (f64::INFINITY, 0f64);
     for (i, weight) in weights.into_iter().enumerate() {
-        energy += weight / 12.0 * vicinity.metric_at(a + v * (i as f64 / 4.0))?.form(v);
+        let square = vicinity.metric_at(a + v * (i as f64 / 4.0))?.form(v);
+        energy += weight / 12.0 * square;
+        (least, most) = (least.min(square), most.max(square));
     }
     let middle = a.midpoint(b);
     let (mx, my) = (vicinity.slope(middle, DVec2::X)?, vicinity.slope(middle, DVec2::Y)?);
     // Γ(v, v) = (∂ᵥM) v − ½ ∇(vᵀMv).
     let christoffel = (mx * v.x + my * v.y).apply(v) - 0.5 * DVec2::new(mx.form(v), my.form(v));
     let saved = vicinity.metric_at(middle)?.inverse().form(christoffel) / 12.0;
-    Some((energy - saved.min(MAX_SHARE * energy)).sqrt())
+    if saved > MAX_SHARE * energy || most > MAX_RATIO * MAX_RATIO * least {
+        let ends = [vicinity.metric_at(a)?.norm(v), vicinity.metric_at(b)?.norm(v)];
+        return (v.abs().max_element() <= 1.0).then_some(0.5 * (ends[0] + ends[1]));
+    }
+    Some((energy - saved).sqrt().max(vicinity.least_length(a, b)))
 }
 
 /// Whether no node of the cells within `radius` of a point is closed: then all points there are in sight of each other.

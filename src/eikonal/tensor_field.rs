@@ -1,14 +1,18 @@
 //! Speed tensors on the nodes, in the solver's own units, tile by tile.
 
+use std::array::from_fn;
 use std::ops::Range;
 
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::stencil::foot::Steps;
+use super::stencil::ring::{RING, TRIANGLES};
+use super::stencil::segment::diagonal_cost;
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
-use crate::grid::tiling::{AREA, SIDE, Tiling};
+use crate::grid::tiling::{AREA, PADDED, PaddedTile, SIDE, Tiling};
 use crate::linalg::Sym2;
 use crate::linalg::simd::{self, Kernel};
 use crate::metric::SpeedBlock;
@@ -18,7 +22,7 @@ use crate::surface::BLOCK;
 const _: () = assert!(SIDE == BLOCK, "a tile is filled from one block of speeds");
 
 /// `D` of a tile's nodes, row by row: `xx`, `xy` and the determinant, which is 0 where the node is closed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TensorTile {
     pub(crate) xx: [f32; AREA],
     pub(crate) xy: [f32; AREA],
@@ -29,6 +33,61 @@ impl TensorTile {
     const CLOSED: Self = Self { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
 }
 
+/// Cells that touch the nodes of a row of a tile: one more than there are nodes.
+pub(crate) const CELLS: usize = SIDE + 1;
+
+/// `D` in the middles of the cells that touch the nodes of a tile, row by row from the cell north-west of the first node; as in
+/// [`TensorTile`]. The determinant is 0 beyond the grid.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CellTile {
+    pub(crate) xx: [f32; CELLS * CELLS],
+    pub(crate) xy: [f32; CELLS * CELLS],
+    pub(crate) det: [f32; CELLS * CELLS],
+}
+
+impl CellTile {
+    const CLOSED: Self =
+        Self { xx: [0.0; CELLS * CELLS], xy: [0.0; CELLS * CELLS], det: [0.0; CELLS * CELLS] };
+
+    fn get(&self, cell: usize) -> [f32; 3] {
+        [self.xx[cell], self.xy[cell], self.det[cell]]
+    }
+
+    fn set(&mut self, cell: usize, [xx, xy, det]: [f32; 3]) {
+        (self.xx[cell], self.xy[cell], self.det[cell]) = (xx, xy, det);
+    }
+}
+
+/// What weighs the steps of a tile, at its nodes and around it: the length of a step under the tensor of its cell and the climb are added in
+/// squares, and their root is multiplied by the mean of the costs at both ends.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WeightTile {
+    /// Infinite beyond the grid and where it is unknown.
+    pub(crate) cost: PaddedTile,
+    /// Heights times the root of the climb weight, in stored units of distance.
+    pub(crate) rise: PaddedTile,
+}
+
+/// What steps in a tile cost.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StepPrices<'a> {
+    /// The tensors of its nodes: for the factor, and where nodes are closed.
+    pub(crate) nodes: &'a TensorTile,
+    /// The tensors of the cells around its nodes: what steps are priced by; `None` to price them by the node where they arrive.
+    pub(crate) cells: Option<&'a CellTile>,
+    /// What else steps cost, if anything.
+    pub(crate) weights: Option<&'a WeightTile>,
+    /// Whether the metric is known at the nodes only, so that functionals of second order take it from there.
+    pub(crate) is_by_nodes: bool,
+}
+
+impl StepPrices<'_> {
+    /// Whether nodes are closed and steps priced in the same way.
+    pub(crate) fn are_like(&self, other: &Self) -> bool {
+        self.nodes == other.nodes && self.cells == other.cells && self.weights == other.weights
+    }
+}
+
 /// The speed tensors of a grid in index coordinates (column, row; spacing 1), divided by a power of four
 /// so that typical entries are near 1 and `f32` never overflows, whatever the unit of the terrain.
 ///
@@ -37,6 +96,13 @@ impl TensorTile {
 pub struct TensorField {
     pub(crate) tiling: Tiling,
     tiles: Vec<TensorTile>,
+    /// What steps are priced by: the metric in the middle of each cell. Empty if only the tensors of the nodes are known, see
+    /// [`from_fn`](Self::from_fn).
+    cells: Vec<CellTile>,
+    /// Empty if steps are not weighted.
+    weights: Vec<WeightTile>,
+    /// Whether the metric is known at the nodes only.
+    is_by_nodes: bool,
     /// `D = scale · stored`, so distance is stored distance divided by [`root_scale`](Self::root_scale).
     root_scale: f64,
     /// Mean over the open nodes of the length of a cell, `det(D)^(−1/4)`, in stored units.
@@ -47,7 +113,8 @@ pub struct TensorField {
 }
 
 impl TensorField {
-    /// Samples a metric at the nodes of its surface; periodic where the surface is. Rows at a pole, where cells have hardly any width, are closed.
+    /// Samples a metric at the nodes of its surface and, on a heightmap or where steps are weighted, in the middles of its cells; periodic where the surface is.
+    /// Rows at a pole, where cells have hardly any width, are closed.
     ///
     /// # Errors
     /// [`Error::Argument`] if the metric has no quadratic form, a closed direction fewer than 3 nodes, or a tensor is too far from
@@ -65,12 +132,21 @@ impl TensorField {
                 *det = if by.x < widest { *det } else { Default::default() };
             }
         };
-        let field = Self::build(surface.cols(), surface.rows(), &stretch, sample, control)?;
-        let field = field.periodic(surface.periodic())?;
-        Ok(Self { unit: metric.unit(), frame: surface.frame().cloned(), ..field })
+        let mut field = Self::build(surface.cols(), surface.rows(), &stretch, sample, control)?;
+        field.make_periodic(surface.periodic())?;
+        field.unit = metric.unit();
+        field.frame = surface.frame().cloned();
+        // Surfaces in space are smooth, but may have poles, where the middle of a cell stands for neither of its edges.
+        if surface.frame().is_some() || metric.is_weighted() {
+            field.sample_cells(metric, widest, control)?;
+            field.weigh(metric);
+            field.is_by_nodes = metric.is_known_at_nodes();
+        }
+        Ok(field)
     }
 
-    /// The field of a function of `(column, row)` in index coordinates; `None`, or a tensor that is not positive definite, for a
+    /// The field of a function of `(column, row)` in index coordinates, of which nothing is known between the nodes: a step is priced by the
+    /// tensor of the node where it arrives. Tensors of the [`Tensor`](crate::metric::Tensor) metric are priced along the way. `None`, or a tensor that is not positive definite, for a
     /// closed node.
     ///
     /// # Errors
@@ -103,6 +179,11 @@ impl TensorField {
     /// # Errors
     /// [`Error::Argument`] if there are fewer than 3 nodes in a periodic direction.
     pub fn periodic(mut self, directions: [bool; 2]) -> Result<Self> {
+        self.make_periodic(directions)?;
+        Ok(self)
+    }
+
+    fn make_periodic(&mut self, directions: [bool; 2]) -> Result<()> {
         for (periodic, count) in directions.into_iter().zip([self.cols(), self.rows()]) {
             if periodic && count < 3 {
                 return Err(Error::argument(
@@ -113,7 +194,99 @@ impl TensorField {
             }
         }
         self.tiling.periodic = directions;
-        Ok(self)
+        Ok(())
+    }
+
+    /// Gives the cells the tensors of a metric. Those at a row that is stretched by more than `widest`, a pole, are closed.
+    fn sample_cells(
+        &mut self,
+        metric: &MetricField<'_>,
+        widest: f64,
+        control: &Control,
+    ) -> Result<()> {
+        let surface = metric.surface();
+        let at = |row: f64| surface.axes(row).recip();
+        let is_open = |row: usize| [0.0, 1.0].iter().all(|by| at(row as f64 + by).x < widest);
+        let stretch: Vec<_> = (0..surface.rows()).map(|row| at(row as f64 + 0.5)).collect();
+        let (tiling, shrink) = (self.tiling, self.root_scale.recip());
+        let own_cells = |speeds: &mut SpeedBlock, tile: usize| {
+            let mut cells = CellTile::CLOSED;
+            if control.cancel.is_cancelled() {
+                return cells;
+            }
+            let (col, row) = ((tile % tiling.across) * SIDE, (tile / tiling.across) * SIDE);
+            metric.block_cells(col, row, speeds);
+            let mut tensors = TensorTile::CLOSED;
+            let stretch = &stretch[row..];
+            simd::dispatch(Store { speeds, stretch, shrink, tile: &mut tensors });
+            let [cols, rows] = cells_of(&tiling, tile);
+            for j in (0..rows).filter(|j| is_open(row + j)) {
+                for i in 0..cols {
+                    let place = j * SIDE + i;
+                    let d = [tensors.xx[place], tensors.xy[place], tensors.det[place]];
+                    cells.set((j + 1) * CELLS + i + 1, d);
+                }
+            }
+            cells
+        };
+        self.cells = (0..tiling.tiles())
+            .into_par_iter()
+            .with_min_len(tiling.across)
+            .map_init(SpeedBlock::default, own_cells)
+            .collect();
+        control.check()?;
+        self.share_borders();
+        Ok(())
+    }
+
+    /// Gives each tile the cells north and west of it, which its neighbours have.
+    fn share_borders(&mut self) {
+        let (tiling, cells) = (self.tiling, &self.cells);
+        let border = |tile: usize| -> [[f32; 3]; 2 * CELLS - 1] {
+            from_fn(|k| {
+                let (i, j) = border_cell(k);
+                let at = tiling.seen_from(tile, i as isize - 1, j as isize - 1);
+                at.map_or([0.0; 3], |(tile, place)| {
+                    cells[tile].get((place / SIDE + 1) * CELLS + place % SIDE + 1)
+                })
+            })
+        };
+        let borders: Vec<_> = (0..tiling.tiles()).into_par_iter().map(border).collect();
+        self.cells.par_iter_mut().zip(borders).for_each(|(cells, border)| {
+            for (k, d) in border.into_iter().enumerate() {
+                let (i, j) = border_cell(k);
+                cells.set(j * CELLS + i, d);
+            }
+        });
+    }
+
+    /// Takes over what a metric weighs steps by.
+    fn weigh(&mut self, metric: &MetricField<'_>) {
+        let climb = metric.climb_weight().sqrt() * self.root_scale;
+        if !metric.is_weighted() && !metric.is_known_at_nodes() {
+            return;
+        }
+        let tiling = self.tiling;
+        let surface = metric.surface();
+        let level = if climb > 0.0 { surface.point(DVec2::ZERO).z } else { 0.0 };
+        let weights = |tile: usize| {
+            let mut weights = WeightTile {
+                cost: [[f32::INFINITY; PADDED]; PADDED],
+                rise: [[0.0; PADDED]; PADDED],
+            };
+            let places = tiling.places_around(tile).enumerate();
+            for (k, (tile, place)) in places.filter_map(|(k, place)| Some((k, place?))) {
+                let (col, row) = tiling.node_at(tile, place);
+                let (j, i) = (k / (PADDED), k % (PADDED));
+                weights.cost[j][i] = metric.node_cost(col, row) as f32;
+                if climb > 0.0 {
+                    let z = surface.point(DVec2::new(col as f64, row as f64)).z;
+                    weights.rise[j][i] = ((z - level) * climb) as f32;
+                }
+            }
+            weights
+        };
+        self.weights = (0..tiling.tiles()).into_par_iter().map(weights).collect();
     }
 
     /// The part of the field made of the tiles that hold the given columns and rows, and its first column and row. A periodic direction stays
@@ -131,8 +304,17 @@ impl TensorField {
         let tiling = Tiling { periodic, ..Tiling::new(cols, rows) };
         let row = |y: usize| &self.tiles[y * self.tiling.across..][across.clone()];
         let tiles = down.clone().flat_map(row).cloned().collect();
+        let (mut cells, mut weights) = (Vec::new(), Vec::new());
+        for y in down.clone().map(|y| y * self.tiling.across) {
+            if !self.cells.is_empty() {
+                cells.extend_from_slice(&self.cells[y..][across.clone()]);
+            }
+            if !self.weights.is_empty() {
+                weights.extend_from_slice(&self.weights[y..][across.clone()]);
+            }
+        }
         let first = [across.start * SIDE, down.start * SIDE];
-        (Self { tiling, tiles, frame: None, ..*self }, first)
+        (Self { tiling, tiles, cells, weights, frame: None, ..*self }, first)
     }
 
     /// Closes the nodes for which `is_open`, given column and row, is false.
@@ -192,7 +374,18 @@ impl TensorField {
         });
         let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
         let mean_step = mean_step as f32;
-        Ok(Self { tiling, tiles, root_scale, mean_step, unit: Unit::Unknown, frame: None })
+        let (cells, weights) = (Vec::new(), Vec::new());
+        Ok(Self {
+            tiling,
+            tiles,
+            cells,
+            weights,
+            is_by_nodes: false,
+            root_scale,
+            mean_step,
+            unit: Unit::Unknown,
+            frame: None,
+        })
     }
 
     /// Unit of the distance; [`Unit::Unknown`] if it is not known.
@@ -223,6 +416,9 @@ impl TensorField {
     /// # Errors
     /// [`Error::Argument`] if the node is not on the grid, or a diagonal entry or the determinant of the tensor more than 10¹⁵ times
     /// larger or smaller than was typical of the field when it was made.
+    ///
+    /// In a field that was sampled from a metric the cells around a node that is opened get the mean of the tensors of their corners; closing a
+    /// node leaves them as they are.
     pub fn set(&mut self, col: usize, row: usize, tensor: Option<Sym2>) -> Result<()> {
         if col >= self.cols() || row >= self.rows() {
             return Err(Error::argument("the node", "not on the grid", "on it").at_node(col, row));
@@ -239,7 +435,58 @@ impl TensorField {
         tile.xx[place] = stored(d.xx);
         tile.xy[place] = stored(d.xy);
         tile.det[place] = stored(d.det());
+        if !self.cells.is_empty() && open.is_some() {
+            self.update_around(col, row);
+        }
         Ok(())
+    }
+
+    /// Makes the cells around a node anew, and its cost where costs are those of the tensors.
+    fn update_around(&mut self, col: usize, row: usize) {
+        let mut tiles: Vec<usize> = (-1..=1)
+            .flat_map(|j| (-1..=1).map(move |i| (col as isize + i, row as isize + j)))
+            .filter_map(|(col, row)| self.tiling.node(col, row))
+            .map(|(col, row)| self.tiling.place(col, row).0)
+            .collect();
+        tiles.sort_unstable();
+        tiles.dedup();
+        for tile in tiles {
+            self.average_cells(tile, [col, row]);
+        }
+    }
+
+    /// Gives the cells of a tile that have this node as a corner the mean of the tensors of their corners, without the costs.
+    fn average_cells(&mut self, tile: usize, node: [usize; 2]) {
+        let corners: Vec<_> = self.tiling.places_around(tile).collect();
+        let (place, side) = (self.tiling.place(node[0], node[1]), PADDED);
+        for at in (0..corners.len()).filter(|&at| corners[at] == Some(place)) {
+            let (i, j) = (at % side, at / side);
+            for (i, j) in [
+                (i, j),
+                (i.wrapping_sub(1), j),
+                (i, j.wrapping_sub(1)),
+                (i.wrapping_sub(1), j.wrapping_sub(1)),
+            ] {
+                if i >= CELLS || j >= CELLS {
+                    continue;
+                }
+                let around = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)];
+                let tensors = around.iter().filter_map(|&(i, j)| {
+                    let (owner, place) = corners[j * side + i]?;
+                    let nodes = &self.tiles[owner];
+                    let [xx, xy, det] = [nodes.xx[place], nodes.xy[place], nodes.det[place]];
+                    let cost = self.weights(tile).map_or(1.0, |weights| weights.cost[j][i]);
+                    let d = Sym2::new(xx.into(), xy.into(), ((det + xy * xy) / xx).into());
+                    (det > 0.0).then(|| d * f64::from(cost * cost))
+                });
+                let (sum, count) =
+                    tensors.fold((Sym2::default(), 0.0), |(sum, n), d| (sum + d, n + 1.0));
+                if count > 0.0 {
+                    let d = sum * f64::recip(count);
+                    self.cells[tile].set(j * CELLS + i, [d.xx as f32, d.xy as f32, d.det() as f32]);
+                }
+            }
+        }
     }
 
     /// Whether the node may be entered.
@@ -249,7 +496,68 @@ impl TensorField {
         self.tiles[tile].det[place] > 0.0
     }
 
-    /// The tensors of a tile.
+    /// What steps in a tile cost.
+    pub(super) fn prices(&self, tile: usize) -> StepPrices<'_> {
+        let (nodes, cells) = (&self.tiles[tile], self.cells.get(tile));
+        StepPrices { nodes, cells, weights: self.weights(tile), is_by_nodes: self.is_by_nodes }
+    }
+
+    /// What steps from a node cost.
+    pub(super) fn steps(&self, col: usize, row: usize) -> Steps {
+        let (tile, place) = self.tiling.place(col, row);
+        let (i, j) = (place % SIDE, place / SIDE);
+        let Some(cells) = self.cells.get(tile) else {
+            let metric = self.metric(col, row);
+            return Steps { metrics: [metric; 8], ring: [1.0; 8], own: 1.0 };
+        };
+        let weights = self.weights(tile);
+        let metrics = TRIANGLES.map(|t| {
+            let (dx, dy) = RING[t.b];
+            let cell = (j + usize::from(dy > 0)) * CELLS + i + usize::from(dx > 0);
+            let [xx, xy, det] = cells.get(cell).map(f64::from);
+            let metric = Sym2::new((det + xy * xy) / xx, -xy, xx) * det.recip();
+            let climb = weights.map_or(DVec2::ZERO, |weights| {
+                let rise = |(x, y): (i32, i32)| {
+                    let at = |at: usize, by: i32| (at + 1).wrapping_add_signed(by as isize);
+                    f64::from(weights.rise[at(j, y)][at(i, x)])
+                };
+                let (own, a, b) = (rise((0, 0)), rise(RING[t.a]), rise(RING[t.b]));
+                let along = DVec2::new((a - own) * f64::from(dx), (b - a) * f64::from(dy));
+                if t.along_y {
+                    DVec2::new((b - a) * f64::from(dx), (a - own) * f64::from(dy))
+                } else {
+                    along
+                }
+            });
+            (det > 0.0).then(|| metric + Sym2::outer(climb))
+        });
+        let costs = weights.map_or(([1.0; 8], 1.0), |weights| {
+            let cost = |(x, y): (i32, i32)| {
+                let at = |at: usize, by: i32| (at + 1).wrapping_add_signed(by as isize);
+                f64::from(weights.cost[at(j, y)][at(i, x)])
+            };
+            let (mut ring, own) = (RING.map(cost), cost((0, 0)));
+            for b in [1, 3, 5, 7] {
+                let corners =
+                    [own, ring[b - 1], ring[b], ring[(b + 1) % 8]].map(|cost| cost as f32);
+                ring[b] = diagonal_cost(corners[0], corners[1], corners[2], corners[3]).into();
+            }
+            (ring, own)
+        });
+        Steps { metrics, ring: costs.0, own: costs.1 }
+    }
+
+    /// Whether steps are priced by cells.
+    pub(super) fn has_cells(&self) -> bool {
+        !self.cells.is_empty()
+    }
+
+    /// What weighs the steps of a tile, if anything.
+    pub(crate) fn weights(&self, tile: usize) -> Option<&WeightTile> {
+        self.weights.get(tile)
+    }
+
+    /// The tensors of a tile's nodes.
     pub(crate) fn tensors(&self, tile: usize) -> &TensorTile {
         &self.tiles[tile]
     }
@@ -274,10 +582,40 @@ impl TensorField {
         self.metric(col, row)
     }
 
-    /// Stored metric at grid coordinates: bilinear over the open corners of the cell; `None` if all are closed.
-    pub(crate) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
-        self.tiling.bilinear(at, |col, row| self.metric_of(col, row))
+    /// The cost of a node by which steps are weighted; `None` where closed.
+    pub(super) fn cost(&self, col: isize, row: isize) -> Option<f64> {
+        let (col, row) = self.tiling.node(col, row)?;
+        let (tile, place) = self.tiling.place(col, row);
+        let cost = self.weights(tile).map_or(1.0, |w| w.cost[place / SIDE + 1][place % SIDE + 1]);
+        self.is_open(col, row).then_some(cost.into())
     }
+
+    /// Stored metric at grid coordinates, over the open corners of the cell: the cost and what is left of the metric are bilinear. `None`
+    /// if all are closed.
+    pub(crate) fn metric_at(&self, at: DVec2) -> Option<Sym2> {
+        if self.weights.is_empty() {
+            return self.tiling.bilinear(at, |col, row| self.metric_of(col, row));
+        }
+        let cost = self.tiling.bilinear(at, |col, row| self.cost(col, row).map(scalar))?.xx;
+        let metric = self.tiling.bilinear(at, |col, row| {
+            Some(self.metric_of(col, row)? * self.cost(col, row)?.powi(-2))
+        })?;
+        Some(metric * (cost * cost))
+    }
+}
+
+/// Column and row of the `k`-th of the cells that touch a tile from the north and the west.
+fn border_cell(k: usize) -> (usize, usize) {
+    if k < CELLS { (k, 0) } else { (0, k - CELLS + 1) }
+}
+
+/// Columns and rows of the cells of which a node of the tile is the north-western corner.
+fn cells_of(tiling: &Tiling, tile: usize) -> [usize; 2] {
+    let [cols, rows] = tiling.size(tile);
+    let is_last =
+        [tile % tiling.across + 1 == tiling.across, tile / tiling.across + 1 == tiling.down];
+    let beyond = |axis: usize| usize::from(is_last[axis] && !tiling.periodic[axis]);
+    [cols - beyond(0), rows - beyond(1)]
 }
 
 /// The open cells of a tile.
@@ -373,6 +711,11 @@ impl Kernel for Store<'_> {
         }
         Cells { lengths: lengths.iter().sum(), count: counts.iter().sum(), lost: lost.iter().sum() }
     }
+}
+
+/// A number as a tensor, for interpolation.
+fn scalar(value: f64) -> Sym2 {
+    Sym2::new(value, 0.0, value)
 }
 
 /// Whether a number is small and large enough that products of a few such stay in the range of `f32`.

@@ -13,6 +13,11 @@ use crate::linalg::lanes::LANES;
 pub(crate) const SIDE: usize = LANES;
 /// Nodes of a tile.
 pub(crate) const AREA: usize = SIDE * SIDE;
+/// Side of a tile padded with its halo: one node of each neighbour around it.
+pub(crate) const PADDED: usize = SIDE + 2;
+
+/// Values of a tile and of its halo, row by row, each `(column, row)` from −1 to 16.
+pub(crate) type PaddedTile = [[f32; PADDED]; PADDED];
 
 /// The directions to the neighbours of a tile as (tiles east, tiles south): east, south-east and so on around, as on the ring of a node.
 pub(crate) const NEIGHBOURS: [(isize, isize); 8] =
@@ -76,6 +81,12 @@ impl Tiling {
     /// Tile of a node, and its place there: row-major among the nodes of the tile.
     pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
         ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)
+    }
+
+    /// Column and row of the node at a place of a tile.
+    pub(crate) fn node_at(&self, tile: usize, place: usize) -> (usize, usize) {
+        let (x, y) = (tile % self.across, tile / self.across);
+        (x * SIDE + place % SIDE, y * SIDE + place / SIDE)
     }
 
     /// The node at a column and a row, modulo the size of the grid where it is periodic; `None` outside.

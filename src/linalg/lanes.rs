@@ -51,6 +51,12 @@ pub(crate) fn inverse_root(x: f32) -> f32 {
 pub(crate) struct Mask(u32);
 
 impl Mask {
+    /// Of two conditions the first if this one is true.
+    #[inline(always)]
+    pub(crate) fn select(self, a: Self, b: Self) -> Self {
+        Self((self.0 & a.0) | (!self.0 & b.0))
+    }
+
     /// Whether `bit`, a power of two, is set in `bits`.
     #[inline(always)]
     pub(crate) fn of(bits: u32, bit: u32) -> Self {

@@ -145,6 +145,41 @@ impl<'a> MetricField<'a> {
         }
     }
 
+    /// Speed tensors without modifiers in the middles of the cells of the block whose first has its north-western corner at `(col, row)`.
+    pub(crate) fn block_cells(&self, col: usize, row: usize, speeds: &mut SpeedBlock) {
+        let Some(tensor) = self.norm.tensor() else {
+            *speeds = SpeedBlock::default();
+            return;
+        };
+        let block = Block { centres: true, ..Block::from(self.surface, col, row) };
+        let mut jets = mem::take(&mut speeds.jets);
+        self.surface.block_jets(&block, &mut jets);
+        tensor.block(&block, &jets, speeds);
+        speeds.jets = jets;
+    }
+
+    /// Whether steps cost something else than their length under the metric of their cell.
+    pub(crate) fn is_weighted(&self) -> bool {
+        self.modifiers.is_weighted()
+    }
+
+    /// Whether the tensors of the metric are known at the nodes only.
+    pub(crate) fn is_known_at_nodes(&self) -> bool {
+        self.norm.tensor().is_some_and(|tensor| tensor.is_known_at_nodes())
+    }
+
+    /// The climb weight.
+    pub(crate) fn climb_weight(&self) -> f64 {
+        self.modifiers.climb_weight()
+    }
+
+    /// What weighs steps at a node: the cost of the ground there, and of the tensors of a metric that is known at the nodes only.
+    /// Infinite where there is none.
+    pub(crate) fn node_cost(&self, col: usize, row: usize) -> f64 {
+        let own = self.norm.tensor().map_or(1.0, |tensor| tensor.node_cost(col, row));
+        own * self.modifiers.node_cost(col, row)
+    }
+
     /// Speed tensors at the nodes of the block whose first is `(col, row)`; nodes beyond the grid are closed.
     pub(crate) fn block_speeds(&self, col: usize, row: usize, speeds: &mut SpeedBlock) {
         let Some(tensor) = self.norm.tensor() else {
@@ -174,23 +209,44 @@ impl fmt::Debug for MetricField<'_> {
     }
 }
 
-/// Length of a polyline in grid coordinates by Gauss's two points on pieces of at most half a cell, where a step `by`
-/// around `at` costs `cost(at, by)`.
+/// Length of a polyline in grid coordinates by Gauss's two points on pieces of at most half a cell, none of which crosses the border of a cell,
+/// where a step `by` around `at` costs `cost(at, by)`. What is bilinear between the nodes is of second degree along a piece, so that its
+/// integral is exact.
 pub(crate) fn length_along(line: &[DVec2], cost: impl Fn(DVec2, DVec2) -> f64) -> f64 {
+    let segments = line.windows(2).map(|ends| {
+        let cuts = cell_borders(ends[0], ends[1]);
+        cuts.windows(2)
+            .map(|cut| {
+                length_in_cell(ends[0].lerp(ends[1], cut[0]), ends[0].lerp(ends[1], cut[1]), &cost)
+            })
+            .sum::<f64>()
+    });
+    segments.sum()
+}
+
+/// Where the way from `a` to `b` crosses columns and rows of nodes, as shares of it in ascending order, with both ends.
+fn cell_borders(a: DVec2, b: DVec2) -> Vec<f64> {
+    let mut cuts = vec![0.0, 1.0];
+    for (from, to) in [(a.x, b.x), (a.y, b.y)] {
+        let (low, high) = (from.min(to).floor() + 1.0, from.max(to).ceil());
+        let crossings = (0..).map(|k| low + f64::from(k)).take_while(|&at| at < high);
+        cuts.extend(crossings.map(|at| (at - from) / (to - from)));
+    }
+    cuts.sort_unstable_by(f64::total_cmp);
+    cuts
+}
+
+/// The part of [`length_along`] from one point to another of the same cell.
+fn length_in_cell(from: DVec2, to: DVec2, cost: &impl Fn(DVec2, DVec2) -> f64) -> f64 {
     // The points lie 1/√12 of the piece on either side of its middle.
     const ASIDE: f64 = 0.288_675_134_594_812_9;
-    line.windows(2)
-        .map(|ends| {
-            let pieces = (2.0 * ends[0].distance(ends[1])).ceil().max(1.0);
-            let by = (ends[1] - ends[0]) / pieces;
-            (0..pieces as usize)
-                .map(|i| {
-                    let middle = ends[0] + by * (i as f64 + 0.5);
-                    0.5 * (cost(middle - by * ASIDE, by) + cost(middle + by * ASIDE, by))
-                })
-                .sum::<f64>()
-        })
-        .sum()
+    let pieces = (2.0 * from.distance(to)).ceil().max(1.0);
+    let by = (to - from) / pieces;
+    let piece = |i: usize| {
+        let middle = from + by * (i as f64 + 0.5);
+        0.5 * (cost(middle - by * ASIDE, by) + cost(middle + by * ASIDE, by))
+    };
+    (0..pieces as usize).map(piece).sum()
 }
 
 #[cfg(test)]

@@ -128,7 +128,7 @@ fn close_steep(surface: &dyn Surface, row: usize, steepest: f64, open: &mut [boo
     let mut jets = JetBlock::default();
     for (k, open) in open.chunks_mut(BLOCK).enumerate() {
         let first = k * BLOCK;
-        let block = Block { cols: first..first + open.len(), rows: row..row + 1 };
+        let block = Block { cols: first..first + open.len(), rows: row..row + 1, centres: false };
         surface.block_jets(&block, &mut jets);
         for (i, open) in open.iter_mut().enumerate() {
             let DVec2 { x, y } = jets.get(0, i).gradient();
@@ -146,6 +146,22 @@ impl BoundModifiers {
     /// What may close nodes, other than voids.
     pub(super) fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
+    }
+
+    pub(super) fn is_weighted(&self) -> bool {
+        self.climb_weight > 0.0 || self.cost.is_some()
+    }
+
+    pub(super) fn climb_weight(&self) -> f64 {
+        self.climb_weight
+    }
+
+    /// The cost of the ground at a node; 1 if there are no costs, infinite where there is none.
+    pub(super) fn node_cost(&self, col: usize, row: usize) -> f64 {
+        self.cost.as_ref().map_or(1.0, |cost| {
+            let cost = f64::from(cost[self.nodes.index(col, row)]);
+            if cost.is_finite() { cost } else { f64::INFINITY }
+        })
     }
 
     pub(super) fn is_open(&self, col: usize, row: usize) -> bool {
@@ -186,7 +202,7 @@ impl BoundModifiers {
                     simd::dispatch(BlockAverseToClimb { jets, climb_weight, speeds });
                 }
                 None => {
-                    for (j, i, _) in block.nodes() {
+                    for (j, i, _) in block.places() {
                         let rise = jets.get(j, i).rise();
                         let speed = averse_to_climb(speeds.get(j, i), rise, self.climb_weight);
                         speeds.set_with(j, i, speed);

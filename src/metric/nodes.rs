@@ -71,6 +71,17 @@ pub(super) struct NodeTensors<T> {
     pub(super) tensors: T,
 }
 
+impl<T: Deref<Target = [Sym2]>> NodeTensors<T> {
+    /// The tensor of determinant 1 in the middle of a cell: the mean of those of its corners.
+    fn shape(&self, at: DVec2) -> Sym2 {
+        let corners = self.nodes.corners(at).into_iter().map(|(node, _)| self.tensors[node]);
+        let shapes =
+            corners.filter(|d| d.is_positive_definite()).map(|d| d * d.det().sqrt().recip());
+        let sum = shapes.fold(Sym2::default(), |sum, d| sum + d);
+        sum * sum.det().sqrt().recip()
+    }
+}
+
 impl<T: Deref<Target = [Sym2]> + Send + Sync> SpeedTensor for NodeTensors<T> {
     fn speed(&self, at: DVec2, _: &Jet) -> Sym2 {
         self.nodes
@@ -81,7 +92,22 @@ impl<T: Deref<Target = [Sym2]> + Send + Sync> SpeedTensor for NodeTensors<T> {
             .fold(Sym2::default(), |sum, (d, weight)| sum + d * weight)
     }
 
+    fn is_known_at_nodes(&self) -> bool {
+        true
+    }
+
+    fn node_cost(&self, col: usize, row: usize) -> f64 {
+        let d = self.tensors[self.nodes.index(col, row)];
+        if d.is_positive_definite() { d.det().powf(-0.25) } else { f64::INFINITY }
+    }
+
     fn block(&self, block: &Block, _: &JetBlock, speeds: &mut SpeedBlock) {
+        if block.centres {
+            for (j, i, at) in block.places() {
+                speeds.set(j, i, self.shape(at));
+            }
+            return;
+        }
         for (j, i, d) in self.nodes.of_block(&self.tensors, block) {
             speeds.set(j, i, if d.is_positive_definite() { *d } else { Sym2::default() });
         }

@@ -140,6 +140,18 @@ pub trait SpeedTensor: Send + Sync {
         one_by_one(self, block, jets, speeds);
     }
 
+    /// Whether tensors are known at the nodes only. Their size is then a cost of the node, see [`node_cost`](Self::node_cost), and a cell is given
+    /// what is left of them.
+    fn is_known_at_nodes(&self) -> bool {
+        false
+    }
+
+    /// The cost of a node: `det(D)^(−1/4)` where tensors [are known at the nodes only](Self::is_known_at_nodes), else 1.
+    fn node_cost(&self, col: usize, row: usize) -> f64 {
+        let _ = (col, row);
+        1.0
+    }
+
     /// Whether a node has a tensor; where tensors are given node by node, some may have none.
     fn is_open(&self, col: usize, row: usize) -> bool {
         let _ = (col, row);
@@ -154,7 +166,7 @@ pub(super) fn one_by_one(
     jets: &JetBlock,
     speeds: &mut SpeedBlock,
 ) {
-    for (j, i, at) in block.nodes() {
+    for (j, i, at) in block.places() {
         speeds.set_with(j, i, tensor.speed_and_det(at, &jets.get(j, i)));
     }
 }

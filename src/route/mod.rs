@@ -1,11 +1,12 @@
 //! Distances become routes: polylines from the start region to a goal, with their numbers.
 //!
-//! [`trace`] follows the distance down from the goal (`descent.rs`) and moves the line to where it is shortest on the
-//! surface itself (`polish/`); [`Summary`] and [`ProfilePoint`] measure the line on
+//! [`trace`] follows the distance down from the goal (`descent.rs`), and from node to node (`node_path.rs`), and moves both lines to where they are
+//! shortest on the surface itself (`polish/`); the cheaper is the route; [`Summary`] and [`ProfilePoint`] measure the line on
 //! the smooth surface (`profile.rs`); [`Comparison`] sets the routes of several metrics side by side.
 
 mod compare;
 mod descent;
+mod node_path;
 mod polish;
 mod profile;
 
@@ -35,8 +36,8 @@ pub struct Route {
 /// distance was solved with.
 ///
 /// The line begins exactly on the start region, ends exactly at the goal, has a point at least every half cell, and
-/// enters no wall. It is the line of steepest descent on the distance, moved sideways to the nearest one that is shortest under
-/// `metric`, which knows the surface between the nodes too; it never costs more than that line. [`Summary::cost`] is measured
+/// enters no wall. Two lines, that of steepest descent on the distance and that from node to node, are each moved sideways to the nearest one that is
+/// shortest under `metric`, which knows the surface between the nodes too; the cheaper is the route, and costs no more than either. [`Summary::cost`] is measured
 /// between the nodes as well, so it differs from the distance at the goal by the errors of both. In a closed direction the line
 /// begins at the image of the start that is nearest to the goal.
 ///
@@ -80,8 +81,12 @@ fn shortest(
         )
         .at(Location::Grid(goal)));
     }
-    let line = descent::line(distance, goal);
-    Ok(line.map(|line| polish::polish(&line, metric, &|a, b| is_clear(field, a, b))))
+    let clear = |a, b| is_clear(field, a, b);
+    // Where one fails the other may not, and of two local minima the lesser counts.
+    let lines = [descent::line(distance, goal), node_path::line(distance, goal)];
+    let polished = lines.into_iter().flatten().map(|line| polish::polish(&line, metric, &clear));
+    let measured = polished.map(|line| (polish::fine_length(&line, metric), line));
+    Ok(measured.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, line)| line))
 }
 
 /// Whether one may go straight from one point to another nearby.

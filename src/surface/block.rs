@@ -9,13 +9,16 @@ use super::{Jet, Surface, SurfaceJet};
 
 pub(crate) use super::bspline::block::{BLOCK, Lanes};
 
-/// Nodes of a grid side by side: at most [`SIDE`](Self::SIDE) columns and as many rows.
+/// Nodes of a grid side by side, or the cells to the south-east of them: at most [`SIDE`](Self::SIDE) columns and as many rows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
     /// Their columns.
     pub cols: Range<usize>,
     /// Their rows.
     pub rows: Range<usize>,
+    /// Whether the places meant are the middles of the cells rather than the nodes. Those of the last column and row of a grid that is
+    /// not periodic lie beyond it, and mean nothing.
+    pub centres: bool,
 }
 
 impl Block {
@@ -26,13 +29,18 @@ impl Block {
     #[must_use]
     pub fn from(surface: &dyn Surface, col: usize, row: usize) -> Self {
         let end = |at: usize, count: usize| count.min(at + BLOCK);
-        Self { cols: col..end(col, surface.cols()), rows: row..end(row, surface.rows()) }
+        Self {
+            cols: col..end(col, surface.cols()),
+            rows: row..end(row, surface.rows()),
+            centres: false,
+        }
     }
 
-    /// Row and column within the block of each node, and its grid coordinates.
-    pub fn nodes(&self) -> impl Iterator<Item = (usize, usize, DVec2)> + '_ {
-        self.rows.clone().enumerate().flat_map(|(j, row)| {
-            let at = move |col: usize| DVec2::new(col as f64, row as f64);
+    /// Row and column within the block of each place, and its grid coordinates.
+    pub fn places(&self) -> impl Iterator<Item = (usize, usize, DVec2)> + '_ {
+        let shift = if self.centres { 0.5 } else { 0.0 };
+        self.rows.clone().enumerate().flat_map(move |(j, row)| {
+            let at = move |col: usize| DVec2::new(col as f64, row as f64) + shift;
             self.cols.clone().enumerate().map(move |(i, col)| (j, i, at(col)))
         })
     }

@@ -87,9 +87,9 @@ pub trait Surface: Sync {
         self.frame().map_or(DVec3::new(x, y, z), |frame| frame.to_map(at).extend(z))
     }
 
-    /// Jets at the nodes of a block. To be overridden where many together are faster than one by one.
+    /// Jets at the places of a block. To be overridden where many together are faster than one by one.
     fn block_jets(&self, block: &Block, jets: &mut JetBlock) {
-        for (j, i, at) in block.nodes() {
+        for (j, i, at) in block.places() {
             jets.set(j, i, self.jet(at));
         }
     }
@@ -107,7 +107,7 @@ pub trait Surface: Sync {
         for first in (0..self.cols()).step_by(BLOCK) {
             let cols = first..self.cols().min(first + BLOCK);
             let (count, at) = (cols.len(), DVec2::new(first as f64, row as f64));
-            self.block_jets(&Block { cols, rows: row..row + 1 }, &mut room);
+            self.block_jets(&Block { cols, rows: row..row + 1, centres: false }, &mut room);
             room.add_row_in_space(0, count, at, axes, &mut jets);
         }
         jets

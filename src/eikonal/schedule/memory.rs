@@ -10,9 +10,9 @@ use super::tile_store::{TileReader, TileStore, at_start};
 use super::values::Values;
 use crate::eikonal::source::Seeds;
 use crate::eikonal::tensor_field::TensorField;
-use crate::eikonal::tile::{Block, Limits};
+use crate::eikonal::tile::Limits;
 use crate::error::Result;
-use crate::grid::tiling::{AREA, SIDE, Tiling};
+use crate::grid::tiling::{AREA, PaddedTile, SIDE, Tiling};
 
 /// Fewest tiles that a thread fills. A small field is filled by one thread alone: waiting for another, it might take up other work of the
 /// pool that takes many times as long.
@@ -85,12 +85,12 @@ impl MemoryStore {
 }
 
 impl TileStore for MemoryStore {
-    fn read(&self, tile: usize, block: &mut Block) -> Result<()> {
+    fn read(&self, tile: usize, block: &mut PaddedTile) -> Result<()> {
         self.values.read(tile, block);
         Ok(())
     }
 
-    fn write(&self, tile: usize, block: &Block) -> Result<()> {
+    fn write(&self, tile: usize, block: &PaddedTile) -> Result<()> {
         self.values.write(tile, block);
         Ok(())
     }
@@ -200,7 +200,7 @@ impl SharedValues {
     }
 
     /// The values of a tile and of the nodes around it.
-    pub(crate) fn read(&self, tile: usize, block: &mut Block) {
+    pub(crate) fn read(&self, tile: usize, block: &mut PaddedTile) {
         if self.tiling.is_over_seam(tile, 1, 1) {
             return self.read_over_seam(tile, block);
         }
@@ -226,7 +226,7 @@ impl SharedValues {
     }
 
     /// [`read`](Self::read) node by node, for tiles at the seam of a periodic direction.
-    fn read_over_seam(&self, tile: usize, block: &mut Block) {
+    fn read_over_seam(&self, tile: usize, block: &mut PaddedTile) {
         for (node, place) in
             block.as_flattened_mut().iter_mut().zip(self.tiling.places_around(tile))
         {
@@ -235,7 +235,7 @@ impl SharedValues {
     }
 
     /// Stores the values of a tile.
-    pub(crate) fn write(&self, tile: usize, block: &Block) {
+    pub(crate) fn write(&self, tile: usize, block: &PaddedTile) {
         for (line, solved) in self.tile(tile).chunks_exact(SIDE).zip(&block[1..]) {
             for (bits, value) in line.iter().zip(&solved[1..=SIDE]) {
                 bits.store(value.to_bits(), Relaxed);

@@ -53,7 +53,7 @@ impl Equation<'_> {
     fn on(&self, tile: usize) -> Tile<'_> {
         let &Self { field, factors, seeds, tolerance } = self;
         let factor = factors.of_tile(tile).map(|factor| (factor, field.tiling.first(tile)));
-        Tile { tensors: field.tensors(tile), factor, tolerance, seeds: seeds[tile].as_deref() }
+        Tile { prices: field.prices(tile), factor, tolerance, seeds: seeds[tile].as_deref() }
     }
 }
 

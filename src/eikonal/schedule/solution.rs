@@ -7,10 +7,9 @@ use super::tile_store::TileStore;
 use super::values::Values;
 use crate::control::Control;
 use crate::eikonal::stencil::UNREACHED;
-use crate::eikonal::tile::BLOCK;
 use crate::eikonal::tile::kernel::Rule;
 use crate::error::Result;
-use crate::grid::tiling::{SIDE, Tiling, opposite};
+use crate::grid::tiling::{PADDED, SIDE, Tiling, opposite};
 
 /// Which of the values given to a solve are changes.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +90,7 @@ fn activate_front(
     active: &mut ActiveSet,
 ) -> Result<()> {
     let is_edited = |tile: usize| edited.get(tile).is_some_and(|&key| key < f32::INFINITY);
-    let mut block = [[f32::INFINITY; BLOCK]; BLOCK];
+    let mut block = [[f32::INFINITY; PADDED]; PADDED];
     for tile in 0..tiling.tiles() {
         let before = before.tile(tile);
         let all = is_edited(tile) || tiling.neighbours(tile).any(|(_, n)| is_edited(n));
@@ -101,7 +100,7 @@ fn activate_front(
         store.read(tile, &mut block)?;
         let mut key = UNREACHED;
         for (rows, before) in block.windows(3).zip(before.chunks_exact(SIDE)) {
-            let across: [f32; BLOCK] =
+            let across: [f32; PADDED] =
                 std::array::from_fn(|i| rows[0][i].min(rows[1][i]).min(rows[2][i]));
             for (three, &before) in across.windows(3).zip(before) {
                 let least = three[0].min(three[1]).min(three[2]);

@@ -5,9 +5,9 @@ use glam::DVec2;
 use super::tile_store::TileStore;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::tensor_field::TensorField;
-use crate::eikonal::tile::{BLOCK, Limits};
+use crate::eikonal::tile::Limits;
 use crate::error::{Error, Result};
-use crate::grid::tiling::{AREA, SIDE};
+use crate::grid::tiling::{AREA, PADDED, SIDE};
 
 /// When to stop. With any of them, the distances that a map reports are final: the same, within the tolerance, as without stopping. All other
 /// nodes are unreached.
@@ -112,6 +112,11 @@ impl<S: TileStore> Progress<'_, S> {
     }
 
     /// Whether the open corners of the goal's cell, and what their values come from, are final; `None` if there are none.
+    ///
+    /// Final must mean here what it means in [`mask`], or a goal that counts as met loses its value, or the nodes that lead to it. With
+    /// `m` the greatest margin of any tile and `L` the least change left, [`mask`] keeps every value below `L − m`. The ring of a corner
+    /// of value `g` improves it only through values below `g + m`, and a descent reads nodes up to a step farther than it is. So
+    /// `g + max(step, m) + m < L` keeps the corner and all that it needs.
     fn is_converged(&self, goal: DVec2) -> Result<Option<bool>> {
         let field = self.field;
         let (west, east) = (goal.x.floor() as isize, goal.x.ceil() as isize);
@@ -121,7 +126,8 @@ impl<S: TileStore> Progress<'_, S> {
         let mut all = None;
         for (col, row) in corners.into_iter().filter_map(node) {
             let (tile, place) = field.tiling.place(col, row);
-            let last = self.store.value(tile, place)? + self.store.limits(tile)?.longest_step;
+            let step = self.store.limits(tile)?.longest_step;
+            let last = self.store.value(tile, place)? + step.max(self.margin) + self.margin;
             all = Some(all.unwrap_or(true) && last < self.least_change);
         }
         Ok(all)
@@ -142,7 +148,7 @@ pub(crate) fn mask(
     stop: &Stop,
 ) -> Result<()> {
     let largest = stop.largest(field);
-    let mut block = [[UNREACHED; BLOCK]; BLOCK];
+    let mut block = [[UNREACHED; PADDED]; PADDED];
     for tile in 0..field.tiling.tiles() {
         let limits = store.limits(tile)?;
         let is_kept = |value| value <= largest && is_final(value, &limits, least_change);

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use crate::eikonal::source::Seeds;
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::tensor_field::TensorTile;
-use crate::eikonal::tile::{Block, Limits};
+use crate::eikonal::tile::Limits;
 use crate::error::Result;
-use crate::grid::tiling::AREA;
+use crate::grid::tiling::{AREA, PaddedTile};
 
 /// Values at the nodes, and what is known of each tile, by the number of the tile, while a solve runs.
 ///
@@ -17,10 +17,10 @@ use crate::grid::tiling::AREA;
 /// another writes; what is written in one round must be visible in the next.
 pub(crate) trait TileStore: Sync {
     /// The values of a tile and of the nodes around it; infinite outside the grid.
-    fn read(&self, tile: usize, block: &mut Block) -> Result<()>;
+    fn read(&self, tile: usize, block: &mut PaddedTile) -> Result<()>;
 
     /// Stores the values of a tile; those of its halo are ignored, and places beyond the grid stay infinite.
-    fn write(&self, tile: usize, block: &Block) -> Result<()>;
+    fn write(&self, tile: usize, block: &PaddedTile) -> Result<()>;
 
     /// The value at a place of a tile.
     fn value(&self, tile: usize, place: usize) -> Result<f32>;

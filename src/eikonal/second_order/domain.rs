@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::stencil::UNREACHED;
-use super::feet::{Feet, Input, Surroundings};
+use super::feet::{Feet, Input, Roughness, Surroundings};
 use super::first_order::FirstOrder;
 use super::halo::BATCH;
 use crate::control::Control;
@@ -94,6 +94,18 @@ impl<'a> Domain<'a> {
         let (batch, place) = self.place(tile);
         let batch = &self.batches[self.places[batch]? as usize];
         Some((&batch.feet[place], batch.reads[place]))
+    }
+
+    /// The roughness of all its tiles.
+    pub(super) fn roughness(&self) -> Roughness {
+        let feet = self.batches.iter().flat_map(|batch| &batch.feet[..batch.tiles]);
+        let mut sum = [0.0f64; 2];
+        let mut nodes = 0;
+        for Roughness { nodes: count, rejected, lengths } in feet.map(|feet| feet.roughness) {
+            nodes += count;
+            sum = [sum[0] + f64::from(rejected), sum[1] + f64::from(lengths)];
+        }
+        Roughness { nodes, rejected: sum[0] as f32, lengths: sum[1] as f32 }
     }
 
     /// Finds the feet of batches that have none for this round; returns the reached tiles of these in order of distance.

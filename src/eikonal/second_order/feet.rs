@@ -7,9 +7,12 @@ use super::functional::{FactorAt, Foot};
 use super::halo::{BatchBlock, MARGIN, WIDTH, at_offset, fill, rings_of};
 use super::triangle::LaneTriangle;
 use crate::eikonal::stencil::UNREACHED;
-use crate::eikonal::stencil::ring::{RING, ring_of};
+use crate::eikonal::stencil::ring::{RING, ring_of, rings};
 use crate::eikonal::tile::Tile;
-use crate::eikonal::tile::coefficients::{LaneLimits, factoring_terms, line_tensors};
+use crate::eikonal::tile::coefficients::{
+    CellLanes, CellLimits, CellLine, LaneLimits, LineCosts, block_line, cell_tensors,
+    factoring_terms, line_costs, line_tensors,
+};
 use crate::eikonal::tile::transpose::transpose;
 use crate::grid::tiling::{AREA, SIDE};
 use crate::linalg::lanes::{Lanes, choose_bits as choose, lanes};
@@ -28,6 +31,17 @@ pub(super) struct Feet {
     pub(super) descending: bool,
     /// Which lines each line reads: [`BEFORE`], [`ITSELF`] and [`BEHIND`].
     pub(super) reads: [u8; SIDE],
+    pub(super) roughness: Roughness,
+}
+
+/// How rough the ground is for a functional of second order.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Roughness {
+    /// Nodes at which the defect was put aside.
+    pub(super) nodes: u32,
+    /// Sums of the defects put aside and of the lengths of all steps.
+    pub(super) rejected: f32,
+    pub(super) lengths: f32,
 }
 
 /// Largest share in twelve bits: the second round corrects the rounding of the first, and carries little itself.
@@ -49,14 +63,14 @@ pub(super) struct Input<'a> {
 pub(super) struct Surroundings {
     g: BatchBlock,
     e: BatchBlock,
-    /// `M` as xx, xy, yy, and its determinant; 0 where closed.
-    metric: [BatchBlock; 4],
+    /// `M` at the nodes as xx, xy, yy; 0 where closed.
+    metric: [BatchBlock; 3],
 }
 
 impl Default for Surroundings {
     fn default() -> Self {
         let batch = [[0.0; WIDTH]; SIDE + 2 * MARGIN];
-        Self { g: batch, e: batch, metric: [batch; 4] }
+        Self { g: batch, e: batch, metric: [batch; 3] }
     }
 }
 
@@ -84,10 +98,10 @@ impl Surroundings {
             Some(total) => fill(&mut self.e, tiling, part, 0.0, |t| &total[t][..]),
             None => self.e.as_flattened_mut().fill(0.0),
         }
-        let [xx, xy, det, _] = &mut self.metric;
+        let [xx, xy, yy] = &mut self.metric;
         fill(xx, tiling, part, 0.0, |t| &field.tensors(t).xx[..]);
         fill(xy, tiling, part, 0.0, |t| &field.tensors(t).xy[..]);
-        fill(det, tiling, part, 0.0, |t| &field.tensors(t).det[..]);
+        fill(yy, tiling, part, 0.0, |t| &field.tensors(t).det[..]);
         simd::dispatch(Invert { metric: &mut self.metric });
         let again = input.total.is_some();
         for (k, (feet, reads)) in feet.iter_mut().zip(reads).enumerate() {
@@ -95,21 +109,12 @@ impl Surroundings {
             let size = tiling.size(tile);
             let factor = factors.of_tile(tile).map(|factor| (factor, tiling.first(tile)));
             let seeds = seeds[tile].as_deref();
-            let tile = Tile { tensors: field.tensors(tile), factor, tolerance: 0.0, seeds };
+            let tile = Tile { prices: field.prices(tile), factor, tolerance: 0.0, seeds };
             let around = &*self;
-            *reads = match (factor.is_some(), again) {
-                (true, true) => {
-                    simd::dispatch(Find::<true, true> { around, from, tile, size, feet })
-                }
-                (true, false) => {
-                    simd::dispatch(Find::<true, false> { around, from, tile, size, feet })
-                }
-                (false, true) => {
-                    simd::dispatch(Find::<false, true> { around, from, tile, size, feet })
-                }
-                (false, false) => {
-                    simd::dispatch(Find::<false, false> { around, from, tile, size, feet })
-                }
+            *reads = match (tile.prices.weights.is_some(), factor.is_some()) {
+                (true, _) => Input::find::<4, true>(around, from, tile, size, feet, again),
+                (false, true) => Input::find::<1, true>(around, from, tile, size, feet, again),
+                (false, false) => Input::find::<1, false>(around, from, tile, size, feet, again),
             };
         }
     }
@@ -122,6 +127,7 @@ impl Feet {
         by_columns: false,
         descending: false,
         reads: [0; SIDE],
+        roughness: Roughness { nodes: 0, rejected: 0.0, lengths: 0.0 },
     };
 
     /// The feet of a line.
@@ -134,7 +140,7 @@ impl Feet {
             triangle[i] = bits & LaneTriangle::ALL;
             theta[i] = (bits >> LaneTriangle::BITS) as f32 * (1.0 / SHARES);
         }
-        Line { triangle, theta, defect: lanes(&self.defect, place) }
+        Line { triangle, theta, defect: lanes(&self.defect, place), ..Line::UNKNOWN }
     }
 
     #[inline(always)]
@@ -165,9 +171,9 @@ impl Feet {
     }
 }
 
-/// Makes `M = D⁻¹` as xx, xy, yy and its determinant, 0 where closed, from `D` as xx, xy, det.
+/// Makes `M = D⁻¹` as xx, xy, yy, 0 where closed, from `D` as xx, xy, det.
 struct Invert<'a> {
-    metric: &'a mut [BatchBlock; 4],
+    metric: &'a mut [BatchBlock; 3],
 }
 
 impl Kernel for Invert<'_> {
@@ -175,7 +181,7 @@ impl Kernel for Invert<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let [xx, xy, yy, det] = self.metric;
+        let [xx, xy, yy] = self.metric;
         for row in MARGIN - 1..SIDE + MARGIN + 1 {
             for i in 0..WIDTH {
                 let (dxx, dxy, ddet) = (xx[row][i], xy[row][i], yy[row][i]);
@@ -184,9 +190,76 @@ impl Kernel for Invert<'_> {
                 xx[row][i] = choose(open, (ddet + dxy * dxy) * inverse, 0.0);
                 xy[row][i] = choose(open, -dxy * idet, 0.0);
                 yy[row][i] = choose(open, dxx * idet, 0.0);
-                det[row][i] = choose(open, idet, 0.0);
             }
         }
+    }
+}
+
+impl Input<'_> {
+    /// Finds the feet of a tile with the kernel for its equation.
+    fn find<const T: usize, const IS_FACTORED: bool>(
+        around: &Surroundings,
+        from: usize,
+        tile: Tile<'_>,
+        size: [usize; 2],
+        feet: &mut Feet,
+        again: bool,
+    ) -> u8 {
+        if again {
+            simd::dispatch(Find::<T, IS_FACTORED, true> { around, from, tile, size, feet })
+        } else {
+            simd::dispatch(Find::<T, IS_FACTORED, false> { around, from, tile, size, feet })
+        }
+    }
+}
+
+/// The cells of a line: the coefficients of the update, and `M` as xx, xy, yy, which is 0 beyond the grid.
+struct Cells<const T: usize> {
+    update: CellLine<T>,
+    metric: [CellLanes; 3],
+}
+
+impl<const T: usize> Cells<T> {
+    #[inline(always)]
+    fn new(tile: &Tile<'_>, line: usize) -> Self {
+        let mut update = CellLine::CLOSED;
+        update.prepare(tile, line, false, &mut CellLimits::default());
+        let [mut xx, mut xy, mut yy] = cell_tensors(tile, line, false);
+        for i in 0..xx.len() {
+            let (dxx, dxy, ddet) = (xx[i], xy[i], yy[i]);
+            let (open, inverse) = (ddet > 0.0, 1.0 / (dxx * ddet));
+            let idet = dxx * inverse;
+            xx[i] = choose(open, (ddet + dxy * dxy) * inverse, 0.0);
+            xy[i] = choose(open, -dxy * idet, 0.0);
+            yy[i] = choose(open, dxx * idet, 0.0);
+        }
+        Self { update, metric: [xx, xy, yy] }
+    }
+}
+
+/// What the weights of a tile say about the nodes of a line: costs, and how much higher the ring is than each node.
+struct Weights {
+    costs: LineCosts,
+    climb: [Lanes; 8],
+}
+
+impl Weights {
+    #[inline(always)]
+    fn new(tile: &Tile<'_>, line: usize) -> Self {
+        let costs = line_costs(tile, line, false);
+        let mut climb = [[0.0; SIDE]; 8];
+        if let Some(weights) = tile.prices.weights {
+            let lines =
+                [line, line + 1, line + 2].map(|line| block_line(&weights.rise, line, false));
+            climb = rings([&lines[0], &lines[1], &lines[2]], 1);
+            let own = lanes(&lines[1], 1);
+            for k in 0..8 {
+                for i in 0..SIDE {
+                    climb[k][i] -= own[i];
+                }
+            }
+        }
+        Self { costs, climb }
     }
 }
 
@@ -211,7 +284,7 @@ fn rises<const N: usize>(
 
 /// Finds the feet of a tile, if `AGAIN` from those of the round before; the output is the neighbours that it reads. A kernel for
 /// each case: one that reads feet in the first round too is 3 % slower.
-struct Find<'a, const IS_FACTORED: bool, const AGAIN: bool> {
+struct Find<'a, const T: usize, const IS_FACTORED: bool, const AGAIN: bool> {
     around: &'a Surroundings,
     /// The column of the batch at which the tile begins.
     from: usize,
@@ -220,7 +293,9 @@ struct Find<'a, const IS_FACTORED: bool, const AGAIN: bool> {
     feet: &'a mut Feet,
 }
 
-impl<const IS_FACTORED: bool, const AGAIN: bool> Kernel for Find<'_, IS_FACTORED, AGAIN> {
+impl<const T: usize, const IS_FACTORED: bool, const AGAIN: bool> Kernel
+    for Find<'_, T, IS_FACTORED, AGAIN>
+{
     type Output = u8;
 
     #[inline(always)]
@@ -230,14 +305,20 @@ impl<const IS_FACTORED: bool, const AGAIN: bool> Kernel for Find<'_, IS_FACTORED
         if AGAIN && feet.by_columns {
             feet.transpose();
         }
+        let mut north = Cells::<T>::new(&tile, 0);
+        feet.roughness = Roughness::default();
         for row in 0..SIDE {
+            let south = Cells::new(&tile, row + 1);
+            let cells = [&north, &south];
             let at = (from, row);
             let line = if AGAIN {
-                find_line_again::<IS_FACTORED>(around, at, &tile, &feet.line(row))
+                find_line_again::<T, IS_FACTORED>(around, at, &tile, cells, &feet.line(row))
             } else {
-                find_line::<IS_FACTORED>(around, at, &tile, &Line::UNKNOWN)
+                find_line::<T, IS_FACTORED>(around, at, &tile, cells, &Line::UNKNOWN)
             };
+            north = south;
             dependencies.add(row, &line);
+            feet.roughness.add(&line);
             feet.set_line(row, &line);
         }
         dependencies.set(feet, size)
@@ -248,17 +329,18 @@ impl<const IS_FACTORED: bool, const AGAIN: bool> Kernel for Find<'_, IS_FACTORED
 /// is done without them, and with two Newton steps: with one, the error near the pole of a sphere falls with order 0.9 instead
 /// of 1.3.
 #[inline(always)]
-fn find_line_again<const IS_FACTORED: bool>(
+fn find_line_again<const T: usize, const IS_FACTORED: bool>(
     around: &Surroundings,
     at: (usize, usize),
     tile: &Tile<'_>,
+    cells: [&Cells<T>; 2],
     before: &Line,
 ) -> Line {
-    let mut line = find_line::<IS_FACTORED>(around, at, tile, before);
+    let mut line = find_line::<T, IS_FACTORED>(around, at, tile, cells, before);
     if line.is_elsewhere(before) {
         line = Line::UNKNOWN;
         for _ in 0..2 {
-            line = find_line::<IS_FACTORED>(around, at, tile, &line);
+            line = find_line::<T, IS_FACTORED>(around, at, tile, cells, &line);
         }
     }
     line
@@ -269,12 +351,32 @@ pub(super) struct Line {
     pub(super) triangle: [u32; SIDE],
     pub(super) theta: Lanes,
     pub(super) defect: Lanes,
+    /// See [`Minimum`](super::functional::Minimum).
+    rejected: Lanes,
+    length: Lanes,
+}
+
+impl Roughness {
+    /// Adds the nodes of a line.
+    #[inline(always)]
+    fn add(&mut self, line: &Line) {
+        for i in 0..SIDE {
+            self.nodes += u32::from(line.rejected[i] > 0.0);
+            self.rejected += line.rejected[i];
+            self.lengths += line.length[i];
+        }
+    }
 }
 
 impl Line {
     /// No feet.
-    const UNKNOWN: Self =
-        Self { triangle: [LaneTriangle::NONE; SIDE], theta: [0.0; SIDE], defect: [0.0; SIDE] };
+    const UNKNOWN: Self = Self {
+        triangle: [LaneTriangle::NONE; SIDE],
+        theta: [0.0; SIDE],
+        defect: [0.0; SIDE],
+        rejected: [0.0; SIDE],
+        length: [0.0; SIDE],
+    };
 
     /// Whether any foot is in another triangle.
     #[inline(always)]
@@ -290,10 +392,11 @@ impl Line {
 /// Finds the feet of a row of a tile by a step of Newton's method: from the feet `before` that are in the same triangle, from those of first
 /// order where there are none.
 #[inline(always)]
-fn find_line<const IS_FACTORED: bool>(
-    Surroundings { g, e, metric: [xx, xy, yy, det] }: &Surroundings,
+fn find_line<const T: usize, const IS_FACTORED: bool>(
+    Surroundings { g, e, metric: [xx, xy, yy] }: &Surroundings,
     at: (usize, usize),
     tile: &Tile<'_>,
+    cells: [&Cells<T>; 2],
     before: &Line,
 ) -> Line {
     let row = at.1;
@@ -310,46 +413,76 @@ fn find_line<const IS_FACTORED: bool>(
     // The nodes that follow `b` on its line, two lines from that of the node; one for each place of `a`.
     let ahead = rises(g, e, at, [(1, -2), (-2, 1), (-1, -2), (-2, -1)]);
     let behind = rises(g, e, at, [(1, 2), (2, 1), (-1, 2), (2, -1)]);
-    let metrics = [rings_of(xx, at), rings_of(xy, at), rings_of(yy, at)];
+    let Weights { costs, climb } = Weights::new(tile, row);
+    let update = cells.map(|cells| &cells.update);
+    let by_nodes = tile.prices.cells.is_none();
+    let [_, _, dets] = tensors;
+    let metrics = cells.map(|cells| &cells.metric);
+    let nodes = [rings_of(xx, at), rings_of(xy, at), rings_of(yy, at)];
     let own = (0, 0);
     let (xx, xy, yy) = (at_offset(xx, at, own), at_offset(xy, at, own), at_offset(yy, at, own));
-    let (g, det) = (at_offset(g, at, own), at_offset(det, at, own));
+    let g = at_offset(g, at, own);
     let seeds = tile.seeds.map_or([UNREACHED; SIDE], |seeds| lanes(&seeds[..], row * SIDE));
-    let [_, _, dets] = tensors;
-    let mut line = Line { triangle: [0; SIDE], theta: [0.0; SIDE], defect: [0.0; SIDE] };
+    let ratios = cost_ratios(&costs);
+    let mut line = Line { triangle: [0; SIDE], ..Line::UNKNOWN };
     // The triangles first: in one loop with the rest it was 2 % slower.
-    let (mut slopes, mut on) = ([0.0; SIDE], [0.0; SIDE]);
-    for i in 0..SIDE {
-        let mut shifted = ring_of(&ring, i);
-        if IS_FACTORED {
-            for k in 0..8 {
-                shifted[k] += terms[k][i];
+    let (mut slopes, mut on, mut shifted) = ([0.0; SIDE], [0.0; SIDE], ring);
+    if IS_FACTORED {
+        for k in 0..8 {
+            for i in 0..SIDE {
+                shifted[k][i] += terms[k][i];
                 on[i] = choose(terms[k][i] < 0.0, 1.0, on[i]);
             }
         }
-        (line.triangle[i], slopes[i]) = LaneTriangle::best(shifted, [xx[i], xy[i], yy[i]], det[i]);
     }
+    if by_nodes {
+        for i in 0..SIDE {
+            (line.triangle[i], slopes[i]) = LaneTriangle::best_by_node(
+                ring_of(&shifted, i),
+                [xx[i], xy[i], yy[i]],
+                1.0 / dets[i],
+            );
+        }
+    } else {
+        for i in 0..SIDE {
+            (line.triangle[i], slopes[i]) =
+                LaneTriangle::best(ring_of(&shifted, i), update, &costs, i);
+        }
+    }
+    let around = gather(&line.triangle, by_nodes, &metrics, &nodes, &[xx, xy, yy]);
     for i in 0..SIDE {
         let bits = line.triangle[i];
         let triangle = LaneTriangle::from_bits(bits);
-        let (ring, here) = (ring_of(&ring, i), [xx[i], xy[i], yy[i]]);
-        let far = |[e, s, w, n]: &[Lanes; 4]| triangle.side(e[i], s[i], w[i], n[i]);
-        let (xx, xy, yy) =
-            (ring_of(&metrics[0], i), ring_of(&metrics[1], i), ring_of(&metrics[2], i));
-        let axis = [triangle.axis(xx), triangle.axis(xy), triangle.axis(yy)];
-        let diagonal = |ring: [f32; 8]| triangle.diagonals(ring)[0];
+        let ring = ring_of(&ring, i);
+        let (costs_around, climb) = (ring_of(&costs.ring, i), ring_of(&climb, i));
+        let [cost_b, _] = triangle.diagonals(costs_around);
+        let [climb_b, climb_c] = triangle.diagonals(climb);
         let [beside, opposite] = triangle.diagonals(ring);
+        let far_ahead = triangle.side(ahead[0][i], ahead[1][i], ahead[2][i], ahead[3][i]);
+        let far_behind = triangle.side(behind[0][i], behind[1][i], behind[2][i], behind[3][i]);
         let foot = Foot {
             rise: [
                 triangle.axis(ring),
                 beside,
                 opposite,
-                triangle.backwards().choose(far(&ahead), far(&behind)),
+                triangle.backwards().choose(far_ahead, far_behind),
             ],
             slope: slopes[i],
-            here: triangle.mirror(here),
-            at_a: triangle.mirror(axis),
-            at_b: triangle.mirror([diagonal(xx), diagonal(xy), diagonal(yy)]),
+            own: triangle.mirror(at_lane(&around.own, i)),
+            beside: triangle.mirror(at_lane(&around.beside, i)),
+            nodes: [
+                triangle.mirror([xx[i], xy[i], yy[i]]),
+                triangle.mirror(at_lane(&around.a, i)),
+                triangle.mirror(at_lane(&around.b, i)),
+            ],
+            costs: [
+                costs.own[i],
+                open_or(triangle.axis(costs_around), costs.own[i]),
+                open_or(cost_b, costs.own[i]),
+            ],
+            cost_ratio: ratios[i],
+            climb: [triangle.axis(climb), climb_b, climb_c],
+            is_by_nodes: tile.prices.is_by_nodes || by_nodes,
             factor: FactorAt::new(
                 on[i],
                 triangle.mirror(m0),
@@ -357,14 +490,82 @@ fn find_line<const IS_FACTORED: bool>(
             ),
             known: choose(before.triangle[i] == bits, before.theta[i], -1.0),
         };
-        let (theta, defect) = foot.minimise::<IS_FACTORED>();
+        let minimum = if T == 1 {
+            foot.minimise::<IS_FACTORED, false>()
+        } else {
+            foot.minimise::<IS_FACTORED, true>()
+        };
         // Beyond the seam of a periodic grid a value can be read, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);
         line.triangle[i] = if fixed { LaneTriangle::NONE } else { bits };
-        line.theta[i] = choose(fixed, 0.0, theta);
-        line.defect[i] = choose(fixed, 0.0, defect);
+        line.theta[i] = choose(fixed, 0.0, minimum.theta);
+        line.defect[i] = choose(fixed, 0.0, minimum.defect);
+        line.rejected[i] = choose(fixed, 0.0, minimum.rejected);
+        line.length[i] = choose(fixed, 0.0, minimum.length);
     }
     line
+}
+
+/// `M` as xx, xy, yy around the triangle of each node of a line: in its cell, in that on the other side of the edge to `a`, at `a` and at `b`.
+struct Around {
+    own: [Lanes; 3],
+    beside: [Lanes; 3],
+    a: [Lanes; 3],
+    b: [Lanes; 3],
+}
+
+/// Chooses by the triangle of each node from what lies around it; for the metrics of the cells, those of the node where there are none.
+#[inline(always)]
+fn gather(
+    triangles: &[u32; SIDE],
+    by_nodes: bool,
+    [north, south]: &[&[CellLanes; 3]; 2],
+    rings: &[[Lanes; 8]; 3],
+    own: &[Lanes; 3],
+) -> Around {
+    let none = [[0.0; SIDE]; 3];
+    let mut around = Around { own: none, beside: none, a: none, b: none };
+    for k in 0..3 {
+        for i in 0..SIDE {
+            let triangle = LaneTriangle::from_bits(triangles[i]);
+            let cells = [north[k][i], north[k][i + 1], south[k][i], south[k][i + 1]];
+            let [cell, beside] = triangle.cells(cells);
+            around.own[k][i] = choose(by_nodes, own[k][i], cell);
+            around.beside[k][i] = choose(by_nodes, own[k][i], beside);
+            let ring = ring_of(&rings[k], i);
+            around.a[k][i] = triangle.axis(ring);
+            [around.b[k][i], _] = triangle.diagonals(ring);
+        }
+    }
+    around
+}
+
+#[inline(always)]
+fn at_lane(all: &[Lanes; 3], i: usize) -> [f32; 3] {
+    [all[0][i], all[1][i], all[2][i]]
+}
+
+/// A cost; where it is infinite, since the node is closed, that of a neighbour.
+#[inline(always)]
+fn open_or(cost: f32, neighbour: f32) -> f32 {
+    choose(cost < f32::INFINITY, cost, neighbour)
+}
+
+/// The largest cost by the smallest among each node of a line and its open neighbours.
+#[inline(always)]
+fn cost_ratios(costs: &LineCosts) -> Lanes {
+    let (mut most, mut fewest) = (costs.own, costs.own);
+    for ring in &costs.ring {
+        for i in 0..SIDE {
+            let open = ring[i] < f32::INFINITY;
+            most[i] = choose(open & (ring[i] > most[i]), ring[i], most[i]);
+            fewest[i] = choose(ring[i] < fewest[i], ring[i], fewest[i]);
+        }
+    }
+    for i in 0..SIDE {
+        most[i] /= fewest[i];
+    }
+    most
 }
 
 /// Which lines the rows and the columns of a tile read, and the sum of the directions from the nodes to their feet.

@@ -20,13 +20,25 @@ impl Quadratic {
         greatest(self.at(t), 0.0).sqrt()
     }
 
-    /// The root and its first two derivatives in `θ`, to five digits: they only locate the foot, whose error counts squared.
+    /// The root and its first two derivatives in `θ`. Unless exact, to five digits: derivatives only locate the foot, whose error counts squared.
     #[inline(always)]
     fn jet(self, t: f32) -> [f32; 3] {
-        let square = greatest(self.at(t), 1e-12);
-        let inverse = inverse_root(square);
-        let first = (self.1 + t * self.2) * inverse;
-        [square * inverse, first, (self.2 - first * first) * inverse]
+        self.root_jet::<false>(t, [0.0; 3])
+    }
+
+    /// [`jet`](Self::jet) of the root of the form and the square of a climb, which is given with its derivatives.
+    #[inline(always)]
+    fn root_jet<const IS_EXACT: bool>(self, t: f32, [climb, d1, d2]: [f32; 3]) -> [f32; 3] {
+        let square = greatest(self.at(t) + climb * climb, 1e-12);
+        let (root, inverse) = if IS_EXACT {
+            (square.sqrt(), 0.0)
+        } else {
+            let inverse = inverse_root(square);
+            (square * inverse, inverse)
+        };
+        let first = (self.1 + t * self.2 + climb * d1) * inverse;
+        let second = self.2 + d1 * d1 + climb * d2;
+        [root, first, (second - first * first) * inverse]
     }
 }
 
@@ -75,20 +87,42 @@ pub(super) struct Foot {
     pub(super) rise: [f32; 4],
     /// `g(b) − g(a)` as the first-order update reads it, factoring terms included.
     pub(super) slope: f32,
-    /// `M` at the node and at the neighbours `a` and `b`; 0 where closed.
-    pub(super) here: Quadratic,
-    pub(super) at_a: Quadratic,
-    pub(super) at_b: Quadratic,
+    /// `M` in the cell of the triangle, and in that on the other side of the edge to `a`; 0 beyond the grid.
+    pub(super) own: Quadratic,
+    pub(super) beside: Quadratic,
+    /// `M` at the node, `a` and `b`, with all that weighs steps there; 0 where closed.
+    pub(super) nodes: [Quadratic; 3],
+    /// Costs at the node, `a` and `b`.
+    pub(super) costs: [f32; 3],
+    /// The largest cost on the ring by the smallest.
+    pub(super) cost_ratio: f32,
+    /// By how much the weighted heights at (1, 0), (1, 1) and (1, −1) exceed that of the node.
+    pub(super) climb: [f32; 3],
+    /// See [`Tile`](crate::eikonal::tile::Tile).
+    pub(super) is_by_nodes: bool,
     pub(super) factor: FactorAt,
     /// `θ` of the round before; negative if it was in another triangle.
     pub(super) known: f32,
 }
 
+/// The minimum of a functional.
+pub(super) struct Minimum {
+    /// The share of `b` in the foot.
+    pub(super) theta: f32,
+    /// The defect `ρ`. It is 0 where the metric turns or jumps so much between the two cells, or the costs between the nodes, that a
+    /// functional of second order means nothing: there the value of first order stays.
+    pub(super) defect: f32,
+    /// The size of the defect that was put aside there.
+    pub(super) rejected: f32,
+    /// The length of the step.
+    pub(super) length: f32,
+}
+
 impl Foot {
-    /// `θ` after a step of Newton's method, and the defect `ρ` there.
+    /// The minimum after a step of Newton's method.
     #[inline(always)]
-    pub(super) fn minimise<const IS_FACTORED: bool>(self) -> (f32, f32) {
-        let Self { rise: [ra, rb, rc, rd], slope, here, factor, known, .. } = self;
+    pub(super) fn minimise<const IS_FACTORED: bool, const IS_WEIGHTED: bool>(self) -> Minimum {
+        let Self { rise: [ra, rb, rc, rd], slope, factor, known, .. } = self;
         let (mut wa, mut wb, mut wc, mut wd) = (ra, rb, rc, rd);
         if IS_FACTORED {
             wa -= factor.rise(0.0);
@@ -104,43 +138,143 @@ impl Foot {
         let hi = choose(has_b, 1.0, lo);
         let base = choose(has_a, wa, wb);
         let rise = choose(free, wb - wa, 0.0);
-        let (metric_a, metric_b) = (open(self.at_a, here), open(self.at_b, here));
         let g0_square = factor.square();
 
-        // The first-order foot, see `segment`: here γ = wᵀMw, β = aᵀMw and α = aᵀMa.
-        let d = choose(free, slope, 0.0);
-        let inverse = inverse_root(here.2);
-        let middle = here.1 * (inverse * inverse);
-        let across = greatest(here.0 - here.1 * middle, 0.0);
-        let steep = here.2 * greatest(here.2 - d * d, 1e-12 * here.2);
-        let phi = -d * across * inverse_root(greatest(across * steep, 1e-30));
-        let first_order = phi - middle;
+        let first_order = self.first_order::<IS_WEIGHTED>(choose(free, slope, 0.0));
         let t = greatest(lo, least(hi, choose(known >= 0.0, known, first_order)));
-        // Lengths ‖v‖ and their derivatives in θ under the metrics at x, a and b; then those of C(θ) by the product rule.
-        let ([_, d1_x, d2_x], [l_a, d1_a, d2_a], [l_b, d1_b, d2_b]) =
-            (here.jet(t), metric_a.jet(t), metric_b.jet(t));
+        // At the border of the grid there is no cell on the other side.
+        let by_cells = (self.beside.0 > 0.0) & !self.is_by_nodes;
+        let (of_cells, of_nodes) =
+            (self.length_jet::<IS_WEIGHTED, false>(t), self.length_jet_by_nodes(t));
+        let d1_c = choose(by_cells, of_cells[1], of_nodes[0]);
+        let d2_c = choose(by_cells, of_cells[2], of_nodes[1]);
         let (mut d1_g0, mut d2_g0) = (0.0, 0.0);
         if IS_FACTORED {
             let [_, first, second] = g0_square.jet(t);
             (d1_g0, d2_g0) = (factor.on * first, factor.on * second);
         }
-        let first = d1_g0 + rise - 0.5 * (1.0 - 2.0 * t) * curvature
-            + 0.5 * (d1_x + d1_a + t * (d1_b - d1_a) + l_b - l_a);
-        let second =
-            d2_g0 + curvature + 0.5 * (d2_x + d2_a + t * (d2_b - d2_a) + 2.0 * (d1_b - d1_a));
+        let first = d1_g0 + rise - 0.5 * (1.0 - 2.0 * t) * curvature + d1_c;
+        let second = d2_g0 + curvature + d2_c;
         let step = choose(second > 1e-6, first / second, 0.0);
         let t = greatest(lo, least(hi, t - greatest(-0.3, least(0.3, step))));
-        let length = 0.5 * (here.root(t) + (1.0 - t) * metric_a.root(t) + t * metric_b.root(t));
-        let bend = greatest(-0.5 * length, least(0.5 * length, 0.5 * t * (1.0 - t) * curvature));
+        let by_nodes = self.length_by_nodes(t);
+        let length = choose(by_cells, self.length_jet::<IS_WEIGHTED, true>(t)[0], by_nodes);
+        // Beyond, it is the curvature of a kink.
+        let most = choose(self.is_by_nodes, 8.0 * MOST_CURVATURE, MOST_CURVATURE) * length;
+        let bend = 0.5 * t * (1.0 - t) * greatest(-most, least(most, curvature));
         let mut defect = base + t * rise + length - bend;
         if IS_FACTORED {
             defect += factor.rise(t);
         }
-        (t, defect)
+        let share = choose(self.is_by_nodes, 1.0, self.smooth_share::<IS_WEIGHTED>(t));
+        let at_first_order = greatest(lo, least(hi, first_order));
+        Minimum {
+            theta: at_first_order + share * (t - at_first_order),
+            defect: share * defect,
+            rejected: (1.0 - share) * defect.abs(),
+            length,
+        }
+    }
+
+    /// The first-order foot, see [`segment`](crate::eikonal::stencil::segment::segment): here `γ = wᵀMw`, `β = aᵀMw` and `α = aᵀMa`.
+    #[inline(always)]
+    fn first_order<const IS_WEIGHTED: bool>(&self, d: f32) -> f32 {
+        let mut metric = self.own;
+        let mut mean = 1.0;
+        if IS_WEIGHTED {
+            let (x, y) = (self.climb[0], self.climb[1] - self.climb[0]);
+            metric = Quadratic(metric.0 + x * x, metric.1 + x * y, metric.2 + y * y);
+            mean = 0.5 * self.costs[0] + 0.25 * (self.costs[1] + self.costs[2]);
+        }
+        let d = d / mean;
+        let inverse = inverse_root(metric.2);
+        let middle = metric.1 * (inverse * inverse);
+        let across = greatest(metric.0 - metric.1 * middle, 0.0);
+        let steep = metric.2 * greatest(metric.2 - d * d, 1e-12 * metric.2);
+        let phi = -d * across * inverse_root(greatest(across * steep, 1e-30));
+        phi - middle
+    }
+
+    /// The length of the step to `θ` and its first two derivatives: at its middle the length is linear between those under the metrics of the two
+    /// cells. Their squares, or the metrics, would do as well where they differ little; at a pole the widths of cells are linear.
+    #[inline(always)]
+    fn length_jet<const IS_WEIGHTED: bool, const IS_EXACT: bool>(&self, t: f32) -> [f32; 3] {
+        let beside = open(self.beside, self.own);
+        let climb = if IS_WEIGHTED { self.climb_jet(t) } else { [0.0; 3] };
+        let own = self.own.root_jet::<IS_EXACT>(t, climb);
+        let beside = beside.root_jet::<IS_EXACT>(t, climb);
+        let (near, far) = (0.5 * (1.0 + t), 0.5 * (1.0 - t));
+        let jet = [
+            near * own[0] + far * beside[0],
+            near * own[1] + far * beside[1] + 0.5 * (own[0] - beside[0]),
+            near * own[2] + far * beside[2] + (own[1] - beside[1]),
+        ];
+        if !IS_WEIGHTED {
+            return jet;
+        }
+        let [cost, slope] = self.cost(t);
+        [cost * jet[0], cost * jet[1] + slope * jet[0], cost * jet[2] + 2.0 * slope * jet[1]]
+    }
+
+    /// By how much the weighted heights at `(1, θ)` exceed that of the node, quadratic along the ring, and its first two derivatives.
+    #[inline(always)]
+    fn climb_jet(&self, t: f32) -> [f32; 3] {
+        let [at_a, at_b, at_c] = self.climb;
+        let bend = at_b - 2.0 * at_a + at_c;
+        let climb = at_a + t * (at_b - at_a) - 0.5 * t * (1.0 - t) * bend;
+        [climb, at_b - at_a - 0.5 * (1.0 - 2.0 * t) * bend, bend]
+    }
+
+    /// The mean cost of the step to `θ`, and its derivative.
+    #[inline(always)]
+    fn cost(&self, t: f32) -> [f32; 2] {
+        let [own, a, b] = self.costs;
+        [0.5 * (own + a + t * (b - a)), 0.5 * (b - a)]
+    }
+
+    /// How much of the defect counts: 1 where the metric and the costs around the step to `θ` are smooth, 0 where they turn or jump within a
+    /// cell.
+    #[inline(always)]
+    fn smooth_share<const IS_WEIGHTED: bool>(&self, t: f32) -> f32 {
+        let beside = open(self.beside, self.own);
+        let (own, beside) = (self.own.at(t), beside.at(t));
+        let mut ratio = (greatest(own, beside) / least(own, beside)).sqrt();
+        if IS_WEIGHTED {
+            ratio = greatest(ratio, self.cost_ratio);
+        }
+        greatest(0.0, least(1.0, (ROUGH - ratio) / (ROUGH - SMOOTH)))
+    }
+
+    /// The first two derivatives of what the step to `θ` costs by the trapezoidal rule over the nodes.
+    #[inline(always)]
+    fn length_jet_by_nodes(&self, t: f32) -> [f32; 2] {
+        let [own, a, b] = self.nodes;
+        let ([_, d1_x, d2_x], [l_a, d1_a, d2_a], [l_b, d1_b, d2_b]) =
+            (own.jet(t), open(a, own).jet(t), open(b, own).jet(t));
+        [
+            0.5 * (d1_x + d1_a + t * (d1_b - d1_a) + l_b - l_a),
+            0.5 * (d2_x + d2_a + t * (d2_b - d2_a) + 2.0 * (d1_b - d1_a)),
+        ]
+    }
+
+    /// What the step to `θ` costs by the trapezoidal rule over the nodes.
+    #[inline(always)]
+    fn length_by_nodes(&self, t: f32) -> f32 {
+        let [own, a, b] = self.nodes;
+        let (own, a, b) = (own.root(t), open(a, own).root(t), open(b, own).root(t));
+        0.5 * (own + a + t * (b - a))
     }
 }
 
-/// `M` at a neighbour; where that is closed, `M` at the node.
+/// The ground is smooth where lengths of a step under the metrics of the two cells beside it, or costs at its ends, differ by no more than the
+/// first factor, and rough where by more than the second; in between the defect counts in part, so that rounding decides nothing.
+const SMOOTH: f32 = 1.05;
+const ROUGH: f32 = 1.15;
+
+/// Largest second difference along the ring in lengths of a step; eight times as much where the metric is known at the nodes only.
+const MOST_CURVATURE: f32 = 0.5;
+
+/// `M` in the cell on the other side of the edge; beyond the grid, `M` in the own cell.
 #[inline(always)]
 fn open(there: Quadratic, here: Quadratic) -> Quadratic {
     let open = there.0 > 0.0;

@@ -16,6 +16,10 @@
 //!   e(x) = (1−θ) e(a) + θ e(b) + ρ(x).
 //! ```
 //!
+//! Where steps are priced by cells, the metric along the step is that at its middle instead, linear between the middles of the two cells beside
+//! the edge to `a`, times the mean of the costs at both ends, and with the climb along it. Where the metric or the costs turn or jump
+//! within a cell, such a functional means nothing: there the defect is put aside, and the value stays of first order.
+//!
 //! Feet are frozen, so that nothing can oscillate: `e` is a sum of `ρ` along feet, and `|S/8| ≤ C/2`. A foot is
 //! the minimum point of its functional, so that an error in it counts only squared. A second round with `g + e` in place of `g`
 //! removes most of the error that is left.
@@ -31,6 +35,7 @@ mod triangle;
 use rayon::prelude::*;
 
 use self::domain::Domain;
+use self::feet::Roughness;
 pub(super) use self::first_order::FirstOrder;
 use self::transport::carry;
 use super::tile::changes::ROUNDING;
@@ -51,6 +56,10 @@ pub(super) struct Correction {
     total: Vec<[f32; AREA]>,
     /// That of the first round.
     first: Vec<[f32; AREA]>,
+    /// Nodes that were left at first order.
+    rough_nodes: u32,
+    /// The defects put aside there as a share of the length of all steps.
+    roughness: f32,
 }
 
 impl Correction {
@@ -68,7 +77,7 @@ impl Correction {
         changed: &[bool],
         control: &Control,
     ) -> Result<Self> {
-        let Self { total: mut second, mut first } = self;
+        let Self { total: mut second, mut first, .. } = self;
         let rounds = second.par_iter_mut().zip(&mut first);
         rounds.enumerate().for_each(|(tile, (second, first))| {
             for i in 0..AREA {
@@ -95,6 +104,7 @@ impl Correction {
         control.report("correcting distance", 0.5);
         domain.widen();
         let mut total = round(&mut domain, second, Some(&first), TOLERANCE_CELLS[1], control)?;
+        let Roughness { nodes, rejected, lengths } = domain.roughness();
         control.report("correcting distance", 1.0);
         let values = domain.solution.values;
         total.par_iter_mut().zip(&first).enumerate().for_each(|(tile, (total, first))| {
@@ -104,7 +114,13 @@ impl Correction {
                 total[i] = greatest(total[i] + first[i], -values[i]);
             }
         });
-        Ok(Self { total, first })
+        let roughness = if lengths > 0.0 { rejected / lengths } else { 0.0 };
+        Ok(Self { total, first, rough_nodes: nodes, roughness })
+    }
+
+    /// How many nodes were left at first order: where the metric or the costs turn or jump within a cell.
+    pub(super) fn rough_nodes(&self) -> u32 {
+        self.rough_nodes
     }
 
     /// How much is to be added to the value at a place of a tile.
@@ -113,11 +129,14 @@ impl Correction {
     }
 
     /// Estimate of the error of a corrected value: the change by the last round, the share of the correction that typically
-    /// remains as error after it, and rounding.
+    /// remains as error after it, a part of what was put aside on the way, and rounding.
     pub(super) fn error_left(&self, tile: usize, place: usize, value: f32) -> f32 {
         const SHARE_LEFT: f32 = 0.1;
+        /// On real ground defects that were put aside are several times as large as the error that is left.
+        const ROUGH_SHARE: f32 = 0.25;
         let (total, first) = (self.total[tile][place], self.first[tile][place]);
-        (total - first).abs() + SHARE_LEFT * total.abs() + ROUNDING * value
+        let rough = ROUGH_SHARE * self.roughness * value;
+        (total - first).abs() + SHARE_LEFT * total.abs() + rough + ROUNDING * value
     }
 }
 

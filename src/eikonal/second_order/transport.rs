@@ -10,13 +10,13 @@ use super::super::schedule::memory::SharedValues;
 use super::super::schedule::rounds::WINDOW_CELLS;
 use super::super::schedule::worker_pool;
 use super::super::tile::transpose::transpose_block;
-use super::super::tile::{ALL, Block, LineMask};
+use super::super::tile::{ALL, LineMask};
 use super::domain::Domain;
 use super::feet::{self, BEFORE, BEHIND, Feet, Line};
 use super::triangle::LaneTriangle;
 use crate::control::Control;
 use crate::error::Result;
-use crate::grid::tiling::{AREA, SIDE, Tiling, opposite};
+use crate::grid::tiling::{AREA, PaddedTile, SIDE, Tiling, opposite};
 use crate::linalg::lanes::{choose, lanes};
 use crate::linalg::simd::{self, Kernel};
 
@@ -153,7 +153,7 @@ fn carry_tile(
 
 /// Sweeps the correction through a tile; the output is whether it converged.
 struct Carry<'a> {
-    block: &'a mut Block,
+    block: &'a mut PaddedTile,
     feet: &'a Feet,
     tolerance: f32,
 }
@@ -187,7 +187,7 @@ fn changed_neighbours(
     tiling: &Tiling,
     e: &SharedValues,
     tile: usize,
-    block: &Block,
+    block: &PaddedTile,
     tolerance: f32,
 ) -> u8 {
     let [cols, rows] = tiling.size(tile);
@@ -214,7 +214,7 @@ fn changed_neighbours(
 /// One sweep over the lines in `dirty`; returns the lines that read nodes which have changed since by more than `tolerance`.
 #[inline(always)]
 fn sweep(
-    block: &mut Block,
+    block: &mut PaddedTile,
     feet: &Feet,
     tolerance: f32,
     descending: bool,
@@ -249,12 +249,18 @@ fn sweep(
 /// Carries the correction to the nodes of a line, `most` times or until none changes by more than `tolerance`; returns the number of
 /// times that one did.
 #[inline(always)]
-fn carry_line(block: &mut Block, feet: &Feet, row: usize, most: usize, tolerance: f32) -> usize {
+fn carry_line(
+    block: &mut PaddedTile,
+    feet: &Feet,
+    row: usize,
+    most: usize,
+    tolerance: f32,
+) -> usize {
     let [above, here, below] = [&block[row], &block[row + 1], &block[row + 2]];
     let (s, n) = (lanes(below, 1), lanes(above, 1));
     let (se, nw, ne, sw) = (lanes(below, 2), lanes(above, 0), lanes(above, 2), lanes(below, 0));
     let mut old = lanes(here, 1);
-    let Line { triangle: bits, theta, defect } = feet.line(row);
+    let Line { triangle: bits, theta, defect, .. } = feet.line(row);
     // What comes from the neighbouring lines, and the shares of the neighbours east and west in the line itself.
     let (mut from_lines, mut from_east, mut from_west) = ([0f32; SIDE], [0f32; SIDE], [0f32; SIDE]);
     for i in 0..SIDE {

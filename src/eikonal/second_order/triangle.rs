@@ -3,8 +3,9 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use super::functional::Quadratic;
-use crate::eikonal::stencil::ring::{Triangle, for_each_triangle, without_cut_corners};
+use crate::eikonal::stencil::ring::{RING, Triangle, for_each_triangle, without_cut_corners};
 use crate::eikonal::stencil::segment::ClosedForm;
+use crate::eikonal::tile::coefficients::{CellLine, LineCosts, cell_of};
 use crate::linalg::lanes::{Mask, choose_bits as choose, greatest, inverse_root};
 
 /// The best triangle so far, as bits, and the difference along its segment.
@@ -59,6 +60,21 @@ impl LaneTriangle {
         self.negative.differs(self.falling)
     }
 
+    /// Of the values in the cells around the node (north-west, north-east, south-west, south-east) that in the cell of the triangle, and
+    /// that in the cell on the other side of the edge to `a`.
+    #[inline(always)]
+    pub(super) fn cells(self, [nw, ne, sw, se]: [f32; 4]) -> [f32; 2] {
+        let Self { negative, along_y, .. } = self;
+        let backwards = self.backwards();
+        let west = along_y.select(backwards, negative);
+        let (north, south) = (west.choose(nw, ne), west.choose(sw, se));
+        let (north_beside, south_beside) = (west.choose(ne, nw), west.choose(se, sw));
+        // Along x the cell beside is the one across the row, along y the one across the column.
+        let along_x = [backwards.choose(north, south), backwards.choose(south, north)];
+        let other = [negative.choose(north, south), negative.choose(north_beside, south_beside)];
+        [along_y.choose(other[0], along_x[0]), along_y.choose(other[1], along_x[1])]
+    }
+
     /// One of four values, by the place of `a`.
     #[inline(always)]
     pub(super) fn side(self, east: f32, south: f32, west: f32, north: f32) -> f32 {
@@ -95,10 +111,10 @@ impl LaneTriangle {
     }
 
     /// The triangle that gives a node its first-order value, as bits, and the difference `g(b) − g(a)` there, from the
-    /// values around the node and `M` with its determinant. See [`ClosedForm`], here in terms of `M`: `D = [s β; β q]` is
+    /// values around the node and its `M` with its determinant, where steps are priced by that. See [`ClosedForm`], here in terms of `M`: `D = [s β; β q]` is
     /// `[yy −xy; −xy xx]/det M`. Roots to five digits: of two triangles that are as good as each other either will do.
     #[inline(always)]
-    pub(super) fn best(ring: [f32; 8], [xx, xy, yy]: [f32; 3], det: f32) -> (u32, f32) {
+    pub(super) fn best_by_node(ring: [f32; 8], [xx, xy, yy]: [f32; 3], det: f32) -> (u32, f32) {
         let (rising2, falling2) =
             (greatest(xx + yy + 2.0 * xy, 1e-30), greatest(xx + yy - 2.0 * xy, 1e-30));
         let (inv_rising, inv_falling) = (inverse_root(rising2), inverse_root(falling2));
@@ -128,6 +144,30 @@ impl LaneTriangle {
             let better = value < best.value;
             best.value = choose(better, value, best.value);
             best.slope = choose(better, d, best.slope);
+            best.triangle = if better { Self::to_bits(t) } else { best.triangle };
+        });
+        (best.triangle, best.slope)
+    }
+
+    /// The triangle that gives node `i` of a line its first-order value, as bits, and the difference `g(b) − g(a)` there, from the
+    /// values around the node.
+    #[inline(always)]
+    pub(super) fn best<const T: usize>(
+        ring: [f32; 8],
+        cells: [&CellLine<T>; 2],
+        costs: &LineCosts,
+        i: usize,
+    ) -> (u32, f32) {
+        let ring = without_cut_corners(ring);
+        let mut best = Best { value: f32::INFINITY, triangle: 0, slope: 0.0 };
+        for_each_triangle!(t => {
+            let (line, cell) = cell_of::<false>(RING[t.b], i);
+            let (ga, gb) = (ring[t.a], ring[t.b]);
+            let weights = [costs.own[i], costs.ring[t.a][i], costs.ring[t.b][i]];
+            let value = cells[line].through(t, cell, [ga, gb], weights);
+            let better = value < best.value;
+            best.value = choose(better, value, best.value);
+            best.slope = choose(better, gb - ga, best.slope);
             best.triangle = if better { Self::to_bits(t) } else { best.triangle };
         });
         (best.triangle, best.slope)

@@ -34,6 +34,19 @@ impl Triangle {
         let ((ax, ay), (bx, by)) = (RING[a], RING[b]);
         Self { a, b, along_y: ax == 0, negative: ax + ay < 0, falling: bx != by }
     }
+
+    /// Which half of its cell it is. One that lies along the northern edge has 0, along the southern 2; plus 1 if along the eastern edge:
+    ///
+    /// ```text
+    ///   1 ┌──┐      0 ┌──┐      2 │          3    │
+    ///      ╲ │        │ ╱         │ ╲          ╱  │
+    ///        │        │           └──┘       └────┘
+    /// ```
+    pub(crate) const fn half(self) -> usize {
+        let (dx, dy) = RING[self.b];
+        let (southern, eastern) = if self.along_y { (dy > 0, dx < 0) } else { (dy < 0, dx > 0) };
+        (if southern { 2 } else { 0 }) + (if eastern { 1 } else { 0 })
+    }
 }
 
 /// All eight, each followed by its point reflection through the node: the two have the same coefficients.

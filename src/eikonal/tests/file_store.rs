@@ -12,9 +12,9 @@ use tempfile::TempDir;
 use super::*;
 use crate::eikonal::schedule::tile_store::{TileReader, TileStore, at_start};
 use crate::eikonal::source::Seeds;
-use crate::eikonal::tile::{BLOCK, Block, Limits};
+use crate::eikonal::tile::Limits;
 use crate::error::Result;
-use crate::grid::tiling::{AREA, SIDE, Tiling};
+use crate::grid::tiling::{AREA, PADDED, PaddedTile, SIDE, Tiling};
 use crate::grid::{GridFrame, Ground, isolines, levels_by_step};
 use crate::metric::{Isotropic, Metric, Modifiers};
 use crate::route::trace;
@@ -67,7 +67,7 @@ impl FileStore {
 }
 
 impl TileStore for FileStore {
-    fn read(&self, tile: usize, block: &mut Block) -> Result<()> {
+    fn read(&self, tile: usize, block: &mut PaddedTile) -> Result<()> {
         let nodes = block.as_flattened_mut().iter_mut();
         for (node, place) in nodes.zip(self.tiling.places_around(tile)) {
             *node = match place {
@@ -78,9 +78,9 @@ impl TileStore for FileStore {
         Ok(())
     }
 
-    fn write(&self, tile: usize, block: &Block) -> Result<()> {
+    fn write(&self, tile: usize, block: &PaddedTile) -> Result<()> {
         let [cols, rows] = self.tiling.size(tile);
-        for (row, line) in block[1..BLOCK - 1].iter().take(rows).enumerate() {
+        for (row, line) in block[1..PADDED - 1].iter().take(rows).enumerate() {
             self.put(tile, row * SIDE, &line[1..=cols])?;
         }
         Ok(())

@@ -4,10 +4,10 @@
 
 use std::array::from_fn;
 
-use super::{ALL, Block, LineMask};
+use super::{ALL, LineMask};
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::RING;
-use crate::grid::tiling::SIDE;
+use crate::grid::tiling::{PaddedTile, SIDE};
 use crate::linalg::lanes::{choose, lanes, least};
 
 /// Four units in the last place of an `f32`: changes below are rounding.
@@ -29,8 +29,8 @@ pub(super) fn lines_next_to(neighbours: u16, [cols, rows]: [usize; 2]) -> [LineM
 /// on which its values were based; infinite if none. `margins` are those of the neighbours: a node `x` can be improved by a neighbour `y` only if
 /// `g(y) < g(x) + margin`.
 pub(super) fn for_neighbours(
-    before: &Block,
-    after: &Block,
+    before: &PaddedTile,
+    after: &PaddedTile,
     [cols, rows]: [usize; 2],
     margins: [f32; 8],
 ) -> [f32; 8] {
@@ -41,7 +41,7 @@ pub(super) fn for_neighbours(
         least_change(cols, old, new, neighbour, margins[direction])
     };
     let down = |direction: usize, col: usize| {
-        let line = |block: &Block, col: usize| from_fn(|row| block[row + 1][col]);
+        let line = |block: &PaddedTile, col: usize| from_fn(|row| block[row + 1][col]);
         let neighbour = line(after, col.wrapping_add_signed(RING[direction].0 as isize));
         least_change(rows, line(before, col), line(after, col), neighbour, margins[direction])
     };

@@ -15,18 +15,21 @@
 //! ```
 //!
 //! [`segment`](crate::eikonal::stencil::segment::segment) is that minimum over one segment in plain form,
-//! [`Coefficients::best`] the closed form over all eight. A sweep updates a whole row (or column) of 16 nodes at a time, one in each lane,
+//! [`NodeLine::best`] the closed form over all eight. A sweep updates a whole row (or column) of 16 nodes at a time, one in each lane,
 //! and carries changes across the tile in the directions within 45° of its own. Lines none of whose neighbours changed are skipped.
 
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use super::changes::{ROUNDING, for_neighbours, lines_next_to};
-use super::coefficients::{Coefficients, LaneLimits, factoring_terms, line_tensors};
+use super::coefficients::{
+    CellLine, LaneLimits, LineCosts, NodeLine, factoring_terms, line_costs, line_tensors,
+};
 use super::transpose::transpose_block;
-use super::{ALL, BLOCK, Block, Limits, LineMask, Tile};
+use super::{ALL, Limits, LineMask, Tile};
 use crate::eikonal::stencil::UNREACHED;
 use crate::eikonal::stencil::ring::{RING, ring_of, rings, without_cut_corners};
-use crate::grid::tiling::SIDE;
+use crate::eikonal::tensor_field::CELLS;
+use crate::grid::tiling::{PADDED, PaddedTile, SIDE};
 use crate::linalg::lanes::{Lanes, choose, greatest, lanes, least};
 use crate::linalg::simd::{self, Kernel};
 
@@ -76,50 +79,77 @@ pub(crate) struct Solved {
 /// The memory in which a tile is solved; made once for many.
 #[derive(Debug)]
 pub(crate) struct Workspace {
-    /// Transposed while sweeps go by columns.
-    values: Block,
-    by_columns: bool,
+    values: Oriented,
     /// The values before.
-    before: Block,
+    before: PaddedTile,
     /// By rows and by columns.
-    prepared: [Prepared; 2],
+    plain: [Prepared<1>; 2],
+    /// The same where steps are weighted; made when first needed.
+    weighted: Option<Box<[Prepared<4>; 2]>>,
     limits: LaneLimits,
 }
 
 impl Default for Workspace {
     fn default() -> Self {
-        let unreached = [[UNREACHED; BLOCK]; BLOCK];
+        let unreached = [[UNREACHED; PADDED]; PADDED];
         Self {
-            values: unreached,
-            by_columns: false,
+            values: Oriented { block: unreached, by_columns: false },
             before: unreached,
-            prepared: Default::default(),
+            plain: Default::default(),
+            weighted: None,
             limits: LaneLimits::default(),
         }
     }
 }
 
-/// What the update needs of `D`, line by line, made when first needed.
+/// Values of a tile and its halo, transposed while sweeps go by columns.
 #[derive(Debug)]
-struct Prepared {
-    lines: [Coefficients; SIDE],
+struct Oriented {
+    block: PaddedTile,
+    by_columns: bool,
+}
+
+impl Oriented {
+    #[inline(always)]
+    fn orient(&mut self, by_columns: bool) {
+        if self.by_columns != by_columns {
+            self.by_columns = by_columns;
+            transpose_block(&mut self.block);
+        }
+    }
+}
+
+/// What the update needs, line by line, made when first needed.
+#[derive(Debug)]
+struct Prepared<const T: usize> {
+    cells: [CellLine<T>; CELLS],
+    ready_cells: LineMask,
+    nodes: [NodeLine; SIDE],
     /// What to add to each neighbour in the order of [`RING`]; only made by kernels that are `IS_FACTORED`.
     terms: [[Lanes; 8]; SIDE],
     ready: LineMask,
 }
 
-impl Default for Prepared {
+impl<const T: usize> Default for Prepared<T> {
     fn default() -> Self {
-        Self { lines: [Coefficients::CLOSED; SIDE], terms: [[[0.0; SIDE]; 8]; SIDE], ready: 0 }
+        Self {
+            cells: [CellLine::CLOSED; CELLS],
+            ready_cells: 0,
+            nodes: [NodeLine::CLOSED; SIDE],
+            terms: [[[0.0; SIDE]; 8]; SIDE],
+            ready: 0,
+        }
     }
 }
 
 /// Sweeps a tile until it converges. The values in the workspace are those of the tile and its halo, before and afterwards.
 pub(crate) fn solve(workspace: &mut Workspace, problem: &Problem<'_>) -> Solved {
-    workspace.begin();
+    workspace.values.orient(false);
+    workspace.before = workspace.values.block;
+    workspace.limits = LaneLimits::default();
     let Swept { sweeps, is_changed, is_converged } = sweep(workspace, problem);
-    workspace.transpose(false);
-    let Workspace { values, before, limits, .. } = &*workspace;
+    workspace.values.orient(false);
+    let Workspace { values: Oriented { block: values, .. }, before, limits, .. } = &*workspace;
     let limits = limits.of_all();
     let nothing = [f32::INFINITY; 8];
     let changes = if is_changed {
@@ -140,33 +170,63 @@ struct Swept {
 }
 
 fn sweep(workspace: &mut Workspace, problem: &Problem<'_>) -> Swept {
-    // A kernel for each: one that chooses inside was 2 to 4 % slower. `Forget` is seldom run, so that one with factoring does for both.
-    match (problem.rule, problem.tile.factor.is_some()) {
+    let Workspace { values, plain, weighted, limits, .. } = workspace;
+    if problem.tile.prices.weights.is_some() {
+        let prepared = weighted.get_or_insert_default();
+        return sweep_prepared(&mut Sweeping::<4, false> { values, prepared, limits }, problem);
+    }
+    let prepared = plain;
+    if problem.tile.prices.cells.is_some() {
+        sweep_prepared(&mut Sweeping::<1, false> { values, prepared, limits }, problem)
+    } else {
+        sweep_prepared(&mut Sweeping::<1, true> { values, prepared, limits }, problem)
+    }
+}
+
+/// The part of a [`Workspace`] that sweeps change; `BY_NODES` where there are no cells and steps are priced by nodes.
+struct Sweeping<'a, const T: usize, const BY_NODES: bool> {
+    values: &'a mut Oriented,
+    prepared: &'a mut [Prepared<T>; 2],
+    limits: &'a mut LaneLimits,
+}
+
+fn sweep_prepared<const T: usize, const BY_NODES: bool>(
+    room: &mut Sweeping<'_, T, BY_NODES>,
+    problem: &Problem<'_>,
+) -> Swept {
+    for prepared in &mut *room.prepared {
+        (prepared.ready, prepared.ready_cells) = (0, 0);
+    }
+    // A kernel for each: one that chooses inside was 2 to 4 % slower. Weighted steps and `Forget` are less frequent, so that one with
+    // factoring does for both.
+    match (problem.rule, problem.tile.factor.is_some() || T > 1) {
         (Rule::Lower, false) => {
-            simd::dispatch(Sweeps::<_, false> { workspace, problem, update: Lower })
+            simd::dispatch(Sweeps::<_, T, BY_NODES, false> { room, problem, update: Lower })
         }
         (Rule::Lower, true) => {
-            simd::dispatch(Sweeps::<_, true> { workspace, problem, update: Lower })
+            simd::dispatch(Sweeps::<_, T, BY_NODES, true> { room, problem, update: Lower })
         }
         (Rule::Forget, _) => {
-            simd::dispatch(Sweeps::<_, true> { workspace, problem, update: Forget })
+            simd::dispatch(Sweeps::<_, T, BY_NODES, true> { room, problem, update: Forget })
         }
     }
 }
 
-struct Sweeps<'a, U, const IS_FACTORED: bool> {
-    workspace: &'a mut Workspace,
+struct Sweeps<'a, 'b, U, const T: usize, const BY_NODES: bool, const IS_FACTORED: bool> {
+    room: &'a mut Sweeping<'b, T, BY_NODES>,
     problem: &'a Problem<'a>,
     update: U,
 }
 
-impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
+impl<U: Update, const T: usize, const BY_NODES: bool, const IS_FACTORED: bool> Kernel
+    for Sweeps<'_, '_, U, T, BY_NODES, IS_FACTORED>
+{
     type Output = Swept;
 
     /// Sweeps away from the least change and back, then across and back.
     #[inline(always)]
     fn run(self) -> Swept {
-        let Self { workspace, problem, update } = self;
+        let Self { room, problem, update } = self;
         let &Problem { ref tile, size, changed, first, .. } = problem;
         let (dx, dy) = if usize::from(first) < 8 { RING[usize::from(first)] } else { (0, 0) };
         let mut descending = [dy > 0, dx > 0];
@@ -185,8 +245,7 @@ impl<U: Update, const IS_FACTORED: bool> Kernel for Sweeps<'_, U, IS_FACTORED> {
             let dirty = outside[axis] | inside[axis];
             if dirty != 0 {
                 let descending = &mut descending[axis];
-                inside =
-                    workspace.sweep::<IS_FACTORED>(&update, tile, by_columns, *descending, dirty);
+                inside = room.sweep::<IS_FACTORED>(&update, tile, by_columns, *descending, dirty);
                 outside[axis] = 0;
                 swept.sweeps += 1;
                 swept.is_changed |= inside != [0; 2];
@@ -209,35 +268,20 @@ fn margins_with_own(mut margins: [f32; 8], is_own_neighbour: [bool; 2], own: f32
 }
 
 /// The least value of a tile.
-fn least_of(values: &Block) -> f32 {
+fn least_of(values: &PaddedTile) -> f32 {
     let nodes = values[1..=SIDE].iter().flat_map(|line| &line[1..=SIDE]);
     nodes.fold(f32::INFINITY, |least, &value| least.min(value))
 }
 
 impl Workspace {
     /// The values of the tile and its halo: to be filled before it is solved, to be read afterwards.
-    pub(crate) fn values(&mut self) -> &mut Block {
-        self.transpose(false);
-        &mut self.values
+    pub(crate) fn values(&mut self) -> &mut PaddedTile {
+        self.values.orient(false);
+        &mut self.values.block
     }
+}
 
-    #[inline(always)]
-    fn begin(&mut self) {
-        self.transpose(false);
-        self.before = self.values;
-        self.prepared[0].ready = 0;
-        self.prepared[1].ready = 0;
-        self.limits = LaneLimits::default();
-    }
-
-    #[inline(always)]
-    fn transpose(&mut self, by_columns: bool) {
-        if self.by_columns != by_columns {
-            self.by_columns = by_columns;
-            transpose_block(&mut self.values);
-        }
-    }
-
+impl<const T: usize, const BY_NODES: bool> Sweeping<'_, T, BY_NODES> {
     /// One Gauss–Seidel sweep over the rows (or columns) in `dirty`, from the first to the last or the other way
     /// (`descending`), taking in those that become dirty ahead of it.
     ///
@@ -251,8 +295,9 @@ impl Workspace {
         descending: bool,
         mut dirty: LineMask,
     ) -> [LineMask; 2] {
-        self.transpose(by_columns);
-        let Self { values, prepared, limits, .. } = self;
+        let Self { values, prepared, limits } = self;
+        values.orient(by_columns);
+        let values = &mut values.block;
         let prepared = &mut prepared[usize::from(by_columns)];
         let mut changed = [0u32; SIDE];
         for step in 0..SIDE {
@@ -261,10 +306,16 @@ impl Workspace {
                 continue;
             }
             dirty &= !(1 << row);
-            prepared.prepare::<IS_FACTORED>(tile, row, by_columns, limits);
-            let Prepared { lines, terms, .. } = &*prepared;
-            let (line, terms) = (&lines[row], &terms[row]);
-            if update_line::<IS_FACTORED>(update, values, row, line, terms, &mut changed) {
+            prepared.prepare::<BY_NODES, IS_FACTORED>(tile, row, by_columns, limits);
+            let costs = line_costs(tile, row, by_columns);
+            if update_line::<T, BY_NODES, IS_FACTORED>(
+                update,
+                values,
+                row,
+                prepared,
+                &costs,
+                &mut changed,
+            ) {
                 dirty |= around(row);
             }
         }
@@ -276,10 +327,16 @@ impl Workspace {
     }
 }
 
-impl Prepared {
+impl<const T: usize> Prepared<T> {
+    /// The lines of cells before and behind a line of nodes.
+    #[inline(always)]
+    fn around<const BY_NODES: bool>(&self, line: usize) -> [&CellLine<T>; 2] {
+        [&self.cells[line], &self.cells[if BY_NODES { line } else { line + 1 }]]
+    }
+
     /// Computes what a line needs, unless it is ready.
     #[inline(always)]
-    fn prepare<const IS_FACTORED: bool>(
+    fn prepare<const BY_NODES: bool, const IS_FACTORED: bool>(
         &mut self,
         tile: &Tile<'_>,
         line: usize,
@@ -291,7 +348,18 @@ impl Prepared {
         }
         self.ready |= 1 << line;
         let tensors = line_tensors(tile, line, by_columns);
-        self.lines[line].prepare(tile, line, by_columns, &tensors, limits);
+        if BY_NODES {
+            self.cells[line].prepare_nodes(&tensors, &mut limits.cells);
+        }
+        for cells in [line, line + 1] {
+            if !BY_NODES && self.ready_cells & 1 << cells == 0 {
+                self.ready_cells |= 1 << cells;
+                self.cells[cells].prepare(tile, cells, by_columns, &mut limits.cells);
+            }
+        }
+        let cells = [&self.cells[line], &self.cells[if BY_NODES { line } else { line + 1 }]];
+        let nodes = &mut self.nodes[line];
+        nodes.prepare::<T, BY_NODES>(tile, line, by_columns, cells, &tensors[2], limits);
         if IS_FACTORED {
             factoring_terms(tile, line, by_columns, &tensors, &mut self.terms[line], limits);
         }
@@ -300,14 +368,16 @@ impl Prepared {
 
 /// Updates the nodes of a row; sets the bits of those that changed and says if any did.
 #[inline(always)]
-fn update_line<const IS_FACTORED: bool>(
+fn update_line<const T: usize, const BY_NODES: bool, const IS_FACTORED: bool>(
     update: &impl Update,
-    values: &mut Block,
+    values: &mut PaddedTile,
     row: usize,
-    coefficients: &Coefficients,
-    terms: &[Lanes; 8],
+    prepared: &Prepared<T>,
+    costs: &LineCosts,
     changed: &mut [u32; SIDE],
 ) -> bool {
+    let cells = prepared.around::<BY_NODES>(row);
+    let (nodes, terms) = (&prepared.nodes[row], &prepared.terms[row]);
     let rings = rings([&values[row], &values[row + 1], &values[row + 2]], 1);
     let old = lanes(&values[row + 1], 1);
     let mut new = [0f32; SIDE];
@@ -319,8 +389,8 @@ fn update_line<const IS_FACTORED: bool>(
                 ring[k] += terms[k][i];
             }
         }
-        let best = coefficients.best(ring, i);
-        let (value, is_change) = update.update(old[i], best, coefficients, i);
+        let best = nodes.best::<T, BY_NODES>(cells, ring, costs, i);
+        let (value, is_change) = update.update(old[i], best, nodes, i);
         new[i] = value;
         changed[i] |= u32::from(is_change);
         any |= u32::from(is_change);
@@ -338,14 +408,14 @@ fn around(line: usize) -> LineMask {
 /// A [`Rule`].
 trait Update {
     /// The new value of node `i` of a line, from the old one and the best over its ring; and whether the nodes around it have to be updated.
-    fn update(&self, old: f32, best: f32, k: &Coefficients, i: usize) -> (f32, bool);
+    fn update(&self, old: f32, best: f32, k: &NodeLine, i: usize) -> (f32, bool);
 }
 
 struct Lower;
 
 impl Update for Lower {
     #[inline(always)]
-    fn update(&self, old: f32, best: f32, k: &Coefficients, i: usize) -> (f32, bool) {
+    fn update(&self, old: f32, best: f32, k: &NodeLine, i: usize) -> (f32, bool) {
         let significant = greatest(k.tolerance[i], ROUNDING * best);
         let is_change = (old - best > significant) & (best < k.ceiling[i]);
         (choose(best < least(old, k.ceiling[i]), best, old), is_change)
@@ -356,10 +426,10 @@ struct Forget;
 
 impl Update for Forget {
     #[inline(always)]
-    fn update(&self, old: f32, best: f32, k: &Coefficients, i: usize) -> (f32, bool) {
+    fn update(&self, old: f32, best: f32, k: &NodeLine, i: usize) -> (f32, bool) {
         let rounding = ROUNDING * old;
         // Where rounding is not far below the shortest step, two nodes could support each other.
-        let is_small = rounding * rounding < 0.25 * k.least_square_of_steps(i);
+        let is_small = rounding * rounding < 0.25 * k.least_square_of_steps[i];
         let is_supported = (best <= old + rounding) & is_small;
         // Start values need no support.
         let is_lost = !is_supported & (old < least(k.ceiling[i], UNREACHED));
@@ -370,8 +440,9 @@ impl Update for Forget {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::Control;
     use crate::eikonal::stencil::foot::best_foot;
-    use crate::eikonal::tensor_field::TensorTile;
+    use crate::eikonal::tensor_field::TensorField;
     use crate::grid::tiling::AREA;
     use crate::linalg::Sym2;
 
@@ -384,12 +455,13 @@ mod tests {
     }
 
     /// All values of a tile with one start node, cut off from any other.
-    fn solve_alone(tensors: &TensorTile, seeds: &[f32; AREA]) -> Block {
-        let tile = Tile { tensors, factor: None, tolerance: 0.0, seeds: Some(seeds) };
+    fn solve_alone(field: &TensorField, seeds: &[f32; AREA]) -> PaddedTile {
+        let tile =
+            Tile { prices: field.prices(0), factor: None, tolerance: 0.0, seeds: Some(seeds) };
         let mut workspace = Workspace::default();
-        *workspace.values() = [[f32::INFINITY; BLOCK]; BLOCK];
+        *workspace.values() = [[f32::INFINITY; PADDED]; PADDED];
         for place in 0..AREA {
-            let open = tensors.det[place] > 0.0;
+            let open = field.is_open(place % SIDE, place / SIDE);
             let value = if open { seeds[place].min(UNREACHED) } else { f32::INFINITY };
             workspace.values()[place / SIDE + 1][place % SIDE + 1] = value;
         }
@@ -408,20 +480,19 @@ mod tests {
 
     #[test]
     fn a_converged_tile_has_the_values_of_the_plain_update() {
-        let mut tensors = TensorTile { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
-        for place in 0..AREA {
-            let Some(d) = tensor(place) else { continue };
-            (tensors.xx[place], tensors.xy[place]) = (d.xx as f32, d.xy as f32);
-            tensors.det[place] = d.det() as f32;
-        }
+        let tensor = |col: usize, row: usize| tensor(row * SIDE + col);
+        let field = TensorField::from_fn(SIDE, SIDE, tensor, &Control::default()).unwrap();
         let mut seeds = [f32::INFINITY; AREA];
         seeds[100] = 0.0;
-        let values = solve_alone(&tensors, &seeds);
+        let values = solve_alone(&field, &seeds);
         for place in (0..AREA).filter(|&place| place != 100) {
-            let Some(d) = tensor(place) else { continue };
+            if !field.is_open(place % SIDE, place / SIDE) {
+                continue;
+            }
             let (row, col) = (place / SIDE + 1, place % SIDE + 1);
             let ring = rings([&values[row - 1], &values[row], &values[row + 1]], 1);
-            let (best, _) = best_foot(ring_of(&ring, col - 1), [0.0; 8], d.inverse()).unwrap();
+            let steps = field.steps(col - 1, row - 1);
+            let best = best_foot(ring_of(&ring, col - 1), [0.0; 8], &steps).unwrap().value;
             let value = f64::from(values[row][col]);
             assert!((value - best).abs() <= 1e-5 * best, "{place}: {value}, {best}");
         }

@@ -12,14 +12,8 @@ use glam::DVec2;
 
 use super::source::Seeds;
 use super::stencil::factoring::Factor;
-use super::tensor_field::TensorTile;
+use super::tensor_field::StepPrices;
 use crate::grid::tiling::SIDE;
-
-/// Side of a block: a tile and one node of each neighbour around it, its halo.
-pub(crate) const BLOCK: usize = SIDE + 2;
-
-/// Values of a tile and of its halo, row by row, each `(column, row)` from −1 to 16.
-pub(crate) type Block = [[f32; BLOCK]; BLOCK];
 
 /// A set of rows or of columns of a tile, one bit each.
 pub(crate) type LineMask = u32;
@@ -30,7 +24,8 @@ pub(crate) const ALL: LineMask = (1 << SIDE) - 1;
 /// The discrete equation on a tile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile<'a> {
-    pub(crate) tensors: &'a TensorTile,
+    /// What steps in it cost.
+    pub(crate) prices: StepPrices<'a>,
     /// The factor that may apply in the tile, and the tile's first node.
     pub(crate) factor: Option<(&'a Factor, DVec2)>,
     /// A change below this share of a node's shortest step does not count.

@@ -2,17 +2,16 @@
 
 use glam::{Mat4, Vec4};
 
-use super::{BLOCK, Block};
-use crate::grid::tiling::SIDE;
+use crate::grid::tiling::{PADDED, PaddedTile, SIDE};
 
 /// Side of the squares that are transposed in registers: number by number takes three times as long.
 const SQUARE: usize = 4;
 
 /// Transposes a tile and its halo.
-pub(crate) fn transpose_block(block: &mut Block) {
-    const LAST: usize = BLOCK - 1;
+pub(crate) fn transpose_block(block: &mut PaddedTile) {
+    const LAST: usize = PADDED - 1;
     transpose(&mut block[1..LAST], 1);
-    for i in 1..BLOCK {
+    for i in 1..PADDED {
         swap(block, i, 0);
     }
     for i in 1..LAST {
@@ -20,7 +19,7 @@ pub(crate) fn transpose_block(block: &mut Block) {
     }
 }
 
-fn swap(block: &mut Block, row: usize, col: usize) {
+fn swap(block: &mut PaddedTile, row: usize, col: usize) {
     let value = block[row][col];
     block[row][col] = block[col][row];
     block[col][row] = value;
@@ -56,7 +55,7 @@ mod tests {
 
     #[test]
     fn transposes_all_of_a_block() {
-        let block: Block = from_fn(|row| from_fn(|col| (100 * row + col) as f32));
+        let block: PaddedTile = from_fn(|row| from_fn(|col| (100 * row + col) as f32));
         let mut transposed = block;
         transpose_block(&mut transposed);
         assert_eq!(transposed, from_fn(|row| from_fn(|col| block[col][row])));

@@ -103,7 +103,7 @@ fn shorter(
 }
 
 /// Length by the finer quadrature.
-fn fine_length(line: &[DVec2], metric: &impl Fn(DVec2) -> Sym2) -> f64 {
+pub(super) fn fine_length(line: &[DVec2], metric: &impl Fn(DVec2) -> Sym2) -> f64 {
     length_along(line, |at, by| metric(at).norm(by))
 }
 

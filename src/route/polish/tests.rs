@@ -218,3 +218,26 @@ fn nothing_is_asked_of_lines_and_metrics_that_have_nothing() {
     }
     assert_eq!(polish(&points, &|_| IDENTITY, &|_, _| false), refine(&points));
 }
+
+#[test]
+fn polishing_keeps_to_a_road_one_cell_wide() {
+    for dear in [2.0, 10.0, 50.0, 1000.0] {
+        // A road along row 5 and then down column 19, bilinear between the nodes.
+        let node = |c: i32, r: i32| {
+            let on_road = (r == 5 && (3..20).contains(&c)) || (c == 19 && (5..27).contains(&r));
+            if on_road { 1.0 } else { dear }
+        };
+        let cost = |at: DVec2| {
+            let (cell, t) = (at.floor(), at - at.floor());
+            let (c, r) = (cell.x as i32, cell.y as i32);
+            let row = |r| node(c, r) * (1.0 - t.x) + node(c + 1, r) * t.x;
+            row(r) * (1.0 - t.y) + row(r + 1) * t.y
+        };
+        let metric = |at: DVec2| Sym2::new(1.0, 0.0, 1.0) * cost(at).powi(2);
+        let along = (3..19).map(|c| DVec2::new(f64::from(c), 5.0));
+        let line: Vec<DVec2> =
+            along.chain((5..27).map(|r| DVec2::new(19.0, f64::from(r)))).collect();
+        let length = fine_length(&polish(&line, &metric, &|_, _| true), &metric);
+        assert!(length <= 37.0 * (1.0 + 1e-9), "1:{dear}: {length}");
+    }
+}

@@ -74,28 +74,34 @@ const LINES: usize = BLOCK + SUPPORT - 1;
 type Contracted = [Lanes; 3];
 
 impl Fit {
-    /// Jets at the nodes of the grid in columns `col ..` and rows `rows`, at most [`BLOCK`] of them. `per_metre` are the
-    /// nodes per metre along each row of the grid and across it.
+    /// Jets at the nodes of the grid in columns `col ..` and rows `rows`, at most [`BLOCK`] of them; at the middles of the cells south-east of
+    /// them if `centres`. `per_metre` are the nodes per metre along each row of such places and across it.
     pub(in crate::surface) fn jets(
         &self,
         per_metre: &[DVec2],
         col: usize,
         rows: Range<usize>,
+        centres: bool,
         jets: &mut HeightBlock,
     ) {
-        let nodes = &self.y.nodes[rows.clone()];
+        let (columns, uniform) = if centres {
+            (&self.x.centres, &self.x.uniform_centres)
+        } else {
+            (&self.x.nodes, &self.x.uniform)
+        };
+        let nodes = &(if centres { &self.y.centres } else { &self.y.nodes })[rows.clone()];
         let (Some(top), Some(bottom)) = (nodes.first(), nodes.last()) else { return };
         let (width, support) = (self.x.basis.len(), self.y.basis.support());
         let lines = top.start * width..(bottom.start + support) * width;
         let lines = &self.coefficients[lines];
-        if self.x.uniform.contains(&col) && self.x.uniform.contains(&(col + BLOCK - 1)) {
-            let (node, contracted) = (&self.x.nodes[col], &mut jets.lines);
+        if uniform.contains(&col) && uniform.contains(&(col + BLOCK - 1)) {
+            let (node, contracted) = (&columns[col], &mut jets.lines);
             match self.x.basis.support() {
                 4 => simd::dispatch(ContractUniform::<4> { lines, width, node, contracted }),
                 _ => simd::dispatch(ContractUniform::<SUPPORT> { lines, width, node, contracted }),
             }
         } else {
-            contract_any(lines, &self.x, col, &mut jets.lines);
+            contract_any(lines, &self.x, &columns[col..], &mut jets.lines);
         }
         for (i, (node, per_metre)) in nodes.iter().zip(&per_metre[rows]).enumerate() {
             let lines = node.start - top.start..node.start - top.start + support;
@@ -138,10 +144,15 @@ impl<const N: usize> Kernel for ContractUniform<'_, N> {
 }
 
 /// Contracts lines of coefficients at any nodes.
-fn contract_any(lines: &[f64], axis: &Axis, col: usize, contracted: &mut [Contracted; LINES]) {
+fn contract_any(
+    lines: &[f64],
+    axis: &Axis,
+    columns: &[Local],
+    contracted: &mut [Contracted; LINES],
+) {
     let support = axis.basis.support();
     for (line, contracted) in lines.chunks_exact(axis.basis.len()).zip(contracted) {
-        for (i, node) in axis.nodes[col..].iter().take(BLOCK).enumerate() {
+        for (i, node) in columns.iter().take(BLOCK).enumerate() {
             for (order, lanes) in contracted.iter_mut().enumerate() {
                 lanes[i] = dot(&node.weights[order][..support], &line[node.start..]);
             }
@@ -204,11 +215,11 @@ mod tests {
             let fit = Fit::new(&frame, &heights, &plan, &Control::default()).unwrap();
             assert!(fit.x.uniform.contains(&16) && fit.x.uniform.contains(&31));
             let mut jets = HeightBlock::default();
-            fit.jets(&[DVec2::ONE; 21], 16, 2..18, &mut jets);
+            fit.jets(&[DVec2::ONE; 21], 16, 2..18, false, &mut jets);
             let count = 16 + fit.y.basis.support() - 1;
             let lines = &fit.coefficients[fit.y.nodes[2].start * 53..][..count * 53];
             let mut plain = HeightBlock::default().lines;
-            contract_any(lines, &fit.x, 16, &mut plain);
+            contract_any(lines, &fit.x, &fit.x.nodes[16..], &mut plain);
             assert_eq!(jets.lines[..count], plain[..count]);
         }
     }

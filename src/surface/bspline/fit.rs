@@ -59,6 +59,10 @@ pub(in crate::surface) struct Axis {
     pub(in crate::surface) nodes: Vec<Local>,
     /// Nodes around the middle one that have its weights, each one coefficient further on than the node before.
     pub(in crate::surface) uniform: Range<usize>,
+    /// The weights half-way between a node and the next, at the middles of cells.
+    pub(in crate::surface) centres: Vec<Local>,
+    /// As `uniform`, of the middles.
+    pub(in crate::surface) uniform_centres: Range<usize>,
     /// `Σ_i v_i v_iᵀ` with `v_i` the weights at node `i`.
     gram: Banded,
 }
@@ -71,8 +75,11 @@ impl Axis {
         for node in &nodes {
             gram.add_outer(node.start, &node.weights[0][..basis.support()], 1.0);
         }
-        let uniform = uniform(&nodes);
-        Self { basis, nodes, uniform, gram }
+        let last = nodes.len() as f64 - 1.0;
+        let centre = |i: usize| basis.at((i as f64 + 0.5).min(last));
+        let centres: Vec<Local> = (0..nodes.len()).map(centre).collect();
+        let (uniform, uniform_centres) = (uniform(&nodes), uniform(&centres));
+        Self { basis, nodes, uniform, centres, uniform_centres, gram }
     }
 
     /// Matrix of `∫ (d^order s/dt^order)² dt`, by Gauss's three points per interval: exact to degree 5.

@@ -37,6 +37,8 @@ pub struct HeightSurface {
     frame: GridFrame,
     /// Nodes per metre of each row, along and across it.
     per_metre: Vec<DVec2>,
+    /// The same half-way to the next row.
+    per_metre_between: Vec<DVec2>,
     fit: Fit,
     /// Columns of the fit before the first of the grid.
     margin: usize,
@@ -101,8 +103,12 @@ impl HeightSurface {
         if !heights.par_iter().all(|z| z.is_finite()) {
             voids.extend(heights.iter().map(|z| !z.is_finite()));
         }
-        let per_metre = (0..frame.rows()).map(|row| frame.spacing(row as f64).recip()).collect();
-        Self { frame, per_metre, fit, margin, voids, residuals, cutoff }
+        let per_metre = |by: f64| {
+            let row = move |row: usize| row as f64 + by;
+            (0..frame.rows()).map(|i| frame.spacing(row(i)).recip()).collect::<Vec<_>>()
+        };
+        let (per_metre, per_metre_between) = (per_metre(0.0), per_metre(0.5));
+        Self { frame, per_metre, per_metre_between, fit, margin, voids, residuals, cutoff }
     }
 
     /// The grid of the terrain.
@@ -149,7 +155,8 @@ impl HeightSurface {
     pub fn row_jets(&self, row: usize, jets: &mut [HeightJet]) {
         let mut block = HeightBlock::default();
         for (i, jets) in jets[..self.frame.cols()].chunks_mut(BLOCK).enumerate() {
-            self.fit.jets(&self.per_metre, self.margin + i * BLOCK, row..row + 1, &mut block);
+            let col = self.margin + i * BLOCK;
+            self.fit.jets(&self.per_metre, col, row..row + 1, false, &mut block);
             for (i, jet) in jets.iter_mut().enumerate() {
                 *jet = block.jet(0, i);
             }
@@ -201,7 +208,7 @@ impl HeightSurface {
         let (mut sums, mut count) = ([0.0; 2], 0);
         for col in (0..cols).step_by(BLOCK) {
             let band = first..rows.min(first + BLOCK);
-            self.fit.jets(&self.per_metre, self.margin + col, band, &mut jets);
+            self.fit.jets(&self.per_metre, self.margin + col, band, false, &mut jets);
             let mut map_areas = [[0.0; BLOCK]; BLOCK];
             for (row, map_areas) in (first..rows).zip(&mut map_areas) {
                 let cell = share(row, rows, false) / self.per_metre[row].element_product();
@@ -259,7 +266,8 @@ impl Surface for HeightSurface {
 
     fn block_jets(&self, block: &Block, jets: &mut JetBlock) {
         let (col, rows) = (self.margin + block.cols.start, block.rows.clone());
-        self.fit.jets(&self.per_metre, col, rows, jets.heights_mut());
+        let per_metre = if block.centres { &self.per_metre_between } else { &self.per_metre };
+        self.fit.jets(per_metre, col, rows, block.centres, jets.heights_mut());
     }
 
     /// Means go by the nodes of the map; the extent is the diagonal of the grid.

@@ -140,6 +140,9 @@ impl Surface for NurbsGrid {
     }
 
     fn block_jets(&self, block: &Block, jets: &mut JetBlock) {
+        if block.centres {
+            return block.places().for_each(|(j, i, at)| jets.set(j, i, self.jet(at)));
+        }
         let columns = &self.columns[block.cols.clone()];
         for (j, row) in block.rows.clone().enumerate() {
             let row = self.surface.row_jets(columns, self.parameter(1, row as f64));
