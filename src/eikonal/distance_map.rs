@@ -11,7 +11,7 @@ use super::schedule::values::Values;
 use super::second_order::Correction;
 use super::start::StartRegion;
 use super::stencil::UNREACHED;
-use super::tensor_field::{TensorField, TensorTile};
+use super::tensor_field::TensorField;
 use crate::error::Result;
 use crate::grid::tiling::{AREA, SIDE};
 use crate::metric::Unit;
@@ -77,7 +77,7 @@ impl DistanceMap {
     #[must_use]
     pub fn bytes_per_node(&self) -> usize {
         let numbers = if self.correction.is_some() { 3 } else { 1 };
-        size_of::<TensorTile>() / AREA + numbers * size_of::<f32>()
+        self.field.bytes_per_node() + numbers * size_of::<f32>()
     }
 
     /// Distance at a node; infinite where not reached.

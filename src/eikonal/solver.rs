@@ -44,10 +44,11 @@ pub enum Accuracy {
 
 impl Accuracy {
     /// About the most that a solve takes for a node, tensors included: peaks at 3000², less what there was before.
-    fn bytes_per_node(self) -> usize {
+    fn bytes_per_node(self, is_weighted: bool) -> usize {
+        let weights = if is_weighted { 10 } else { 0 };
         match self {
-            Self::Fast => 18,
-            Self::High => 34,
+            Self::Fast => 32 + weights,
+            Self::High => 48 + weights,
         }
     }
 }
@@ -73,7 +74,11 @@ impl Solver {
         control: &Control,
     ) -> Result<DistanceMap> {
         let size = [metric.surface().cols(), metric.surface().rows()];
-        memory::check_cells("a distance over", size, self.accuracy.bytes_per_node())?;
+        memory::check_cells(
+            "a distance over",
+            size,
+            self.accuracy.bytes_per_node(metric.is_weighted()),
+        )?;
         self.solve_field(TensorField::sample(metric, control)?, starts, stop, control)
     }
 

@@ -1,92 +1,24 @@
 //! Speed tensors on the nodes, in the solver's own units, tile by tile.
 
-use std::array::from_fn;
+mod cells;
+mod nodes;
+mod prices;
+mod weights;
+
 use std::ops::Range;
 
 use glam::DVec2;
-use rayon::prelude::*;
 
-use super::stencil::foot::Steps;
-use super::stencil::ring::{RING, TRIANGLES};
-use super::stencil::segment::diagonal_cost;
+pub(crate) use self::prices::{CELLS, CellTile, StepPrices, TensorTile, WeightTile};
 use crate::control::Control;
 use crate::error::{Error, Result};
 use crate::grid::GridFrame;
-use crate::grid::tiling::{AREA, PADDED, PaddedTile, SIDE, Tiling};
+use crate::grid::tiling::{AREA, SIDE, Tiling};
 use crate::linalg::Sym2;
-use crate::linalg::simd::{self, Kernel};
-use crate::metric::SpeedBlock;
-use crate::metric::{MetricField, Unit};
+use crate::metric::{MetricField, SpeedBlock, Unit};
 use crate::surface::BLOCK;
 
 const _: () = assert!(SIDE == BLOCK, "a tile is filled from one block of speeds");
-
-/// `D` of a tile's nodes, row by row: `xx`, `xy` and the determinant, which is 0 where the node is closed.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct TensorTile {
-    pub(crate) xx: [f32; AREA],
-    pub(crate) xy: [f32; AREA],
-    pub(crate) det: [f32; AREA],
-}
-
-impl TensorTile {
-    const CLOSED: Self = Self { xx: [0.0; AREA], xy: [0.0; AREA], det: [0.0; AREA] };
-}
-
-/// Cells that touch the nodes of a row of a tile: one more than there are nodes.
-pub(crate) const CELLS: usize = SIDE + 1;
-
-/// `D` in the middles of the cells that touch the nodes of a tile, row by row from the cell north-west of the first node; as in
-/// [`TensorTile`]. The determinant is 0 beyond the grid.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct CellTile {
-    pub(crate) xx: [f32; CELLS * CELLS],
-    pub(crate) xy: [f32; CELLS * CELLS],
-    pub(crate) det: [f32; CELLS * CELLS],
-}
-
-impl CellTile {
-    const CLOSED: Self =
-        Self { xx: [0.0; CELLS * CELLS], xy: [0.0; CELLS * CELLS], det: [0.0; CELLS * CELLS] };
-
-    fn get(&self, cell: usize) -> [f32; 3] {
-        [self.xx[cell], self.xy[cell], self.det[cell]]
-    }
-
-    fn set(&mut self, cell: usize, [xx, xy, det]: [f32; 3]) {
-        (self.xx[cell], self.xy[cell], self.det[cell]) = (xx, xy, det);
-    }
-}
-
-/// What weighs the steps of a tile, at its nodes and around it: the length of a step under the tensor of its cell and the climb are added in
-/// squares, and their root is multiplied by the mean of the costs at both ends.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct WeightTile {
-    /// Infinite beyond the grid and where it is unknown.
-    pub(crate) cost: PaddedTile,
-    /// Heights times the root of the climb weight, in stored units of distance.
-    pub(crate) rise: PaddedTile,
-}
-
-/// What steps in a tile cost.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StepPrices<'a> {
-    /// The tensors of its nodes: for the factor, and where nodes are closed.
-    pub(crate) nodes: &'a TensorTile,
-    /// The tensors of the cells around its nodes: what steps are priced by; `None` to price them by the node where they arrive.
-    pub(crate) cells: Option<&'a CellTile>,
-    /// What else steps cost, if anything.
-    pub(crate) weights: Option<&'a WeightTile>,
-    /// Whether the metric is known at the nodes only, so that functionals of second order take it from there.
-    pub(crate) is_by_nodes: bool,
-}
-
-impl StepPrices<'_> {
-    /// Whether nodes are closed and steps priced in the same way.
-    pub(crate) fn are_like(&self, other: &Self) -> bool {
-        self.nodes == other.nodes && self.cells == other.cells && self.weights == other.weights
-    }
-}
 
 /// The speed tensors of a grid in index coordinates (column, row; spacing 1), divided by a power of four
 /// so that typical entries are near 1 and `f32` never overflows, whatever the unit of the terrain.
@@ -197,98 +129,6 @@ impl TensorField {
         Ok(())
     }
 
-    /// Gives the cells the tensors of a metric. Those at a row that is stretched by more than `widest`, a pole, are closed.
-    fn sample_cells(
-        &mut self,
-        metric: &MetricField<'_>,
-        widest: f64,
-        control: &Control,
-    ) -> Result<()> {
-        let surface = metric.surface();
-        let at = |row: f64| surface.axes(row).recip();
-        let is_open = |row: usize| [0.0, 1.0].iter().all(|by| at(row as f64 + by).x < widest);
-        let stretch: Vec<_> = (0..surface.rows()).map(|row| at(row as f64 + 0.5)).collect();
-        let (tiling, shrink) = (self.tiling, self.root_scale.recip());
-        let own_cells = |speeds: &mut SpeedBlock, tile: usize| {
-            let mut cells = CellTile::CLOSED;
-            if control.cancel.is_cancelled() {
-                return cells;
-            }
-            let (col, row) = ((tile % tiling.across) * SIDE, (tile / tiling.across) * SIDE);
-            metric.block_cells(col, row, speeds);
-            let mut tensors = TensorTile::CLOSED;
-            let stretch = &stretch[row..];
-            simd::dispatch(Store { speeds, stretch, shrink, tile: &mut tensors });
-            let [cols, rows] = cells_of(&tiling, tile);
-            for j in (0..rows).filter(|j| is_open(row + j)) {
-                for i in 0..cols {
-                    let place = j * SIDE + i;
-                    let d = [tensors.xx[place], tensors.xy[place], tensors.det[place]];
-                    cells.set((j + 1) * CELLS + i + 1, d);
-                }
-            }
-            cells
-        };
-        self.cells = (0..tiling.tiles())
-            .into_par_iter()
-            .with_min_len(tiling.across)
-            .map_init(SpeedBlock::default, own_cells)
-            .collect();
-        control.check()?;
-        self.share_borders();
-        Ok(())
-    }
-
-    /// Gives each tile the cells north and west of it, which its neighbours have.
-    fn share_borders(&mut self) {
-        let (tiling, cells) = (self.tiling, &self.cells);
-        let border = |tile: usize| -> [[f32; 3]; 2 * CELLS - 1] {
-            from_fn(|k| {
-                let (i, j) = border_cell(k);
-                let at = tiling.seen_from(tile, i as isize - 1, j as isize - 1);
-                at.map_or([0.0; 3], |(tile, place)| {
-                    cells[tile].get((place / SIDE + 1) * CELLS + place % SIDE + 1)
-                })
-            })
-        };
-        let borders: Vec<_> = (0..tiling.tiles()).into_par_iter().map(border).collect();
-        self.cells.par_iter_mut().zip(borders).for_each(|(cells, border)| {
-            for (k, d) in border.into_iter().enumerate() {
-                let (i, j) = border_cell(k);
-                cells.set(j * CELLS + i, d);
-            }
-        });
-    }
-
-    /// Takes over what a metric weighs steps by.
-    fn weigh(&mut self, metric: &MetricField<'_>) {
-        let climb = metric.climb_weight().sqrt() * self.root_scale;
-        if !metric.is_weighted() && !metric.is_known_at_nodes() {
-            return;
-        }
-        let tiling = self.tiling;
-        let surface = metric.surface();
-        let level = if climb > 0.0 { surface.point(DVec2::ZERO).z } else { 0.0 };
-        let weights = |tile: usize| {
-            let mut weights = WeightTile {
-                cost: [[f32::INFINITY; PADDED]; PADDED],
-                rise: [[0.0; PADDED]; PADDED],
-            };
-            let places = tiling.places_around(tile).enumerate();
-            for (k, (tile, place)) in places.filter_map(|(k, place)| Some((k, place?))) {
-                let (col, row) = tiling.node_at(tile, place);
-                let (j, i) = (k / (PADDED), k % (PADDED));
-                weights.cost[j][i] = metric.node_cost(col, row) as f32;
-                if climb > 0.0 {
-                    let z = surface.point(DVec2::new(col as f64, row as f64)).z;
-                    weights.rise[j][i] = ((z - level) * climb) as f32;
-                }
-            }
-            weights
-        };
-        self.weights = (0..tiling.tiles()).into_par_iter().map(weights).collect();
-    }
-
     /// The part of the field made of the tiles that hold the given columns and rows, and its first column and row. A periodic direction stays
     /// whole, and stored units the same.
     pub(crate) fn crop(&self, [cols, rows]: [Range<usize>; 2]) -> (Self, [usize; 2]) {
@@ -330,62 +170,11 @@ impl TensorField {
         }
     }
 
-    /// The field of the tensors that `sample` gives for the block whose first node is `(col, row)`, once the
-    /// coordinates are stretched by `stretch`, one for each row.
-    fn build(
-        cols: usize,
-        rows: usize,
-        stretch: &[DVec2],
-        sample: impl Fn(usize, usize, &mut SpeedBlock) + Sync,
-        control: &Control,
-    ) -> Result<Self> {
-        let tiling = Tiling::new(cols, rows);
-        let root_scale = typical_speed(tiling, stretch, &sample);
-        let (mut tiles, mut cells) = (Vec::new(), Vec::new());
-        (0..tiling.tiles())
-            .into_par_iter()
-            .with_min_len(tiling.across)
-            .map_init(SpeedBlock::default, |speeds, i| {
-                let mut tile = TensorTile::CLOSED;
-                if control.cancel.is_cancelled() {
-                    return (tile, Cells::default());
-                }
-                let (col, row) = ((i % tiling.across) * SIDE, (i / tiling.across) * SIDE);
-                sample(col, row, speeds);
-                let (stretch, shrink) = (&stretch[row..], root_scale.recip());
-                let cells = simd::dispatch(Store { speeds, stretch, shrink, tile: &mut tile });
-                (tile, cells)
-            })
-            .unzip_into_vecs(&mut tiles, &mut cells);
-        control.check()?;
-        if let Some(tile) = cells.iter().position(|cells| cells.lost > 0) {
-            let (col, row) = ((tile % tiling.across) * SIDE, (tile / tiling.across) * SIDE);
-            let mut speeds = SpeedBlock::default();
-            sample(col, row, &mut speeds);
-            let (i, j) = (0..AREA)
-                .map(|place| (place % SIDE, place / SIDE))
-                .find(|&(i, j)| speeds.is_open(j, i) && tiles[tile].det[j * SIDE + i] == 0.0)
-                .unwrap_or_default();
-            let count = cells.iter().map(|cells| u64::from(cells.lost)).sum();
-            return Err(too_far(col + i, row + j, count));
-        }
-        let (sum, count) = cells.iter().fold((0.0, 0), |(sum, count), cells| {
-            (sum + f64::from(cells.lengths), count + cells.count as usize)
-        });
-        let mean_step = if count > 0 { sum / count as f64 } else { 1.0 };
-        let mean_step = mean_step as f32;
-        let (cells, weights) = (Vec::new(), Vec::new());
-        Ok(Self {
-            tiling,
-            tiles,
-            cells,
-            weights,
-            is_by_nodes: false,
-            root_scale,
-            mean_step,
-            unit: Unit::Unknown,
-            frame: None,
-        })
+    /// Memory that it takes per node.
+    pub(super) fn bytes_per_node(&self) -> usize {
+        let cells = if self.cells.is_empty() { 0 } else { size_of::<CellTile>() };
+        let weights = if self.weights.is_empty() { 0 } else { size_of::<WeightTile>() };
+        (size_of::<TensorTile>() + cells + weights) / AREA
     }
 
     /// Unit of the distance; [`Unit::Unknown`] if it is not known.
@@ -441,110 +230,11 @@ impl TensorField {
         Ok(())
     }
 
-    /// Makes the cells around a node anew, and its cost where costs are those of the tensors.
-    fn update_around(&mut self, col: usize, row: usize) {
-        let mut tiles: Vec<usize> = (-1..=1)
-            .flat_map(|j| (-1..=1).map(move |i| (col as isize + i, row as isize + j)))
-            .filter_map(|(col, row)| self.tiling.node(col, row))
-            .map(|(col, row)| self.tiling.place(col, row).0)
-            .collect();
-        tiles.sort_unstable();
-        tiles.dedup();
-        for tile in tiles {
-            self.average_cells(tile, [col, row]);
-        }
-    }
-
-    /// Gives the cells of a tile that have this node as a corner the mean of the tensors of their corners, without the costs.
-    fn average_cells(&mut self, tile: usize, node: [usize; 2]) {
-        let corners: Vec<_> = self.tiling.places_around(tile).collect();
-        let (place, side) = (self.tiling.place(node[0], node[1]), PADDED);
-        for at in (0..corners.len()).filter(|&at| corners[at] == Some(place)) {
-            let (i, j) = (at % side, at / side);
-            for (i, j) in [
-                (i, j),
-                (i.wrapping_sub(1), j),
-                (i, j.wrapping_sub(1)),
-                (i.wrapping_sub(1), j.wrapping_sub(1)),
-            ] {
-                if i >= CELLS || j >= CELLS {
-                    continue;
-                }
-                let around = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)];
-                let tensors = around.iter().filter_map(|&(i, j)| {
-                    let (owner, place) = corners[j * side + i]?;
-                    let nodes = &self.tiles[owner];
-                    let [xx, xy, det] = [nodes.xx[place], nodes.xy[place], nodes.det[place]];
-                    let cost = self.weights(tile).map_or(1.0, |weights| weights.cost[j][i]);
-                    let d = Sym2::new(xx.into(), xy.into(), ((det + xy * xy) / xx).into());
-                    (det > 0.0).then(|| d * f64::from(cost * cost))
-                });
-                let (sum, count) =
-                    tensors.fold((Sym2::default(), 0.0), |(sum, n), d| (sum + d, n + 1.0));
-                if count > 0.0 {
-                    let d = sum * f64::recip(count);
-                    self.cells[tile].set(j * CELLS + i, [d.xx as f32, d.xy as f32, d.det() as f32]);
-                }
-            }
-        }
-    }
-
     /// Whether the node may be entered.
     #[must_use]
     pub fn is_open(&self, col: usize, row: usize) -> bool {
         let (tile, place) = self.tiling.place(col, row);
         self.tiles[tile].det[place] > 0.0
-    }
-
-    /// What steps in a tile cost.
-    pub(super) fn prices(&self, tile: usize) -> StepPrices<'_> {
-        let (nodes, cells) = (&self.tiles[tile], self.cells.get(tile));
-        StepPrices { nodes, cells, weights: self.weights(tile), is_by_nodes: self.is_by_nodes }
-    }
-
-    /// What steps from a node cost.
-    pub(super) fn steps(&self, col: usize, row: usize) -> Steps {
-        let (tile, place) = self.tiling.place(col, row);
-        let (i, j) = (place % SIDE, place / SIDE);
-        let Some(cells) = self.cells.get(tile) else {
-            let metric = self.metric(col, row);
-            return Steps { metrics: [metric; 8], ring: [1.0; 8], own: 1.0 };
-        };
-        let weights = self.weights(tile);
-        let metrics = TRIANGLES.map(|t| {
-            let (dx, dy) = RING[t.b];
-            let cell = (j + usize::from(dy > 0)) * CELLS + i + usize::from(dx > 0);
-            let [xx, xy, det] = cells.get(cell).map(f64::from);
-            let metric = Sym2::new((det + xy * xy) / xx, -xy, xx) * det.recip();
-            let climb = weights.map_or(DVec2::ZERO, |weights| {
-                let rise = |(x, y): (i32, i32)| {
-                    let at = |at: usize, by: i32| (at + 1).wrapping_add_signed(by as isize);
-                    f64::from(weights.rise[at(j, y)][at(i, x)])
-                };
-                let (own, a, b) = (rise((0, 0)), rise(RING[t.a]), rise(RING[t.b]));
-                let along = DVec2::new((a - own) * f64::from(dx), (b - a) * f64::from(dy));
-                if t.along_y {
-                    DVec2::new((b - a) * f64::from(dx), (a - own) * f64::from(dy))
-                } else {
-                    along
-                }
-            });
-            (det > 0.0).then(|| metric + Sym2::outer(climb))
-        });
-        let costs = weights.map_or(([1.0; 8], 1.0), |weights| {
-            let cost = |(x, y): (i32, i32)| {
-                let at = |at: usize, by: i32| (at + 1).wrapping_add_signed(by as isize);
-                f64::from(weights.cost[at(j, y)][at(i, x)])
-            };
-            let (mut ring, own) = (RING.map(cost), cost((0, 0)));
-            for b in [1, 3, 5, 7] {
-                let corners =
-                    [own, ring[b - 1], ring[b], ring[(b + 1) % 8]].map(|cost| cost as f32);
-                ring[b] = diagonal_cost(corners[0], corners[1], corners[2], corners[3]).into();
-            }
-            (ring, own)
-        });
-        Steps { metrics, ring: costs.0, own: costs.1 }
     }
 
     /// Whether steps are priced by cells.
@@ -604,30 +294,6 @@ impl TensorField {
     }
 }
 
-/// Column and row of the `k`-th of the cells that touch a tile from the north and the west.
-fn border_cell(k: usize) -> (usize, usize) {
-    if k < CELLS { (k, 0) } else { (0, k - CELLS + 1) }
-}
-
-/// Columns and rows of the cells of which a node of the tile is the north-western corner.
-fn cells_of(tiling: &Tiling, tile: usize) -> [usize; 2] {
-    let [cols, rows] = tiling.size(tile);
-    let is_last =
-        [tile % tiling.across + 1 == tiling.across, tile / tiling.across + 1 == tiling.down];
-    let beyond = |axis: usize| usize::from(is_last[axis] && !tiling.periodic[axis]);
-    [cols - beyond(0), rows - beyond(1)]
-}
-
-/// The open cells of a tile.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cells {
-    /// Sum of their lengths `det(D)^(−1/4)`, in stored units.
-    lengths: f32,
-    count: u32,
-    /// How many others would be open, but have tensors too far from what is typical.
-    lost: u32,
-}
-
 /// The error for `count` tensors, the first of them at this node.
 fn too_far(col: usize, row: usize, count: u64) -> Error {
     let others = match count {
@@ -648,70 +314,6 @@ fn too_far(col: usize, row: usize, count: u64) -> Error {
 
 /// A row whose cells are so many times narrower than those in the middle lies at a pole.
 const NO_WIDTH: f64 = 1e5;
-
-/// A power of two near the typical speed `det(D)^(1/4)`, from tiles spread over the grid.
-fn typical_speed(
-    tiling: Tiling,
-    stretch: &[DVec2],
-    sample: impl Fn(usize, usize, &mut SpeedBlock),
-) -> f64 {
-    const SPREAD: usize = 8;
-    let mut speeds = SpeedBlock::default();
-    let (mut sum, mut count) = (0, 0);
-    for down in (0..tiling.down).step_by(tiling.down.div_ceil(SPREAD).max(1)) {
-        for across in (0..tiling.across).step_by(tiling.across.div_ceil(SPREAD).max(1)) {
-            sample(across * SIDE, down * SIDE, &mut speeds);
-            for (by, det) in stretch[down * SIDE..].iter().zip(&speeds.det) {
-                let squared = (by.x * by.y).powi(2);
-                for det in det.iter().map(|det| det * squared).filter(|det| det.is_normal()) {
-                    // The binary exponent: the logarithm rounded down.
-                    sum += i64::from((det.to_bits() >> 52) as u32 & 0x7ff) - 1023;
-                    count += 1;
-                }
-            }
-        }
-    }
-    let mean = if count > 0 { sum as f64 / f64::from(count) + 0.5 } else { 0.0 };
-    (0.25 * mean).round().exp2()
-}
-
-/// Stores the tensors of a block in coordinates stretched by `stretch` of each row and by `shrink`. Where a tensor is out of the range
-/// of `f32`, the node is closed and counted as lost.
-struct Store<'a> {
-    speeds: &'a SpeedBlock,
-    stretch: &'a [DVec2],
-    shrink: f64,
-    tile: &'a mut TensorTile,
-}
-
-impl Kernel for Store<'_> {
-    type Output = Cells;
-
-    #[inline(always)]
-    fn run(self) -> Cells {
-        let Self { speeds, stretch, shrink, tile } = self;
-        let mut lengths = [0f32; SIDE];
-        let (mut counts, mut lost) = ([0u32; SIDE], [0u32; SIDE]);
-        for (row, by) in stretch.iter().take(SIDE).enumerate() {
-            let (x, y) = (by.x * shrink, by.y * shrink);
-            let (fxx, fxy, fyy, fdet) = (x * x, x * y, y * y, (x * y) * (x * y));
-            for i in 0..SIDE {
-                let (xx, xy) = (speeds.xx[row][i] * fxx, speeds.xy[row][i] * fxy);
-                let (yy, det) = (speeds.yy[row][i] * fyy, speeds.det[row][i] * fdet);
-                let fits = fits(xx) & fits(yy) & fits(det);
-                let place = row * SIDE + i;
-                tile.xx[place] = if fits { xx as f32 } else { 0.0 };
-                tile.xy[place] = if fits { xy as f32 } else { 0.0 };
-                tile.det[place] = if fits { det as f32 } else { 0.0 };
-                let length = (1.0 / det as f32).sqrt().sqrt();
-                lengths[i] += if fits { length } else { 0.0 };
-                counts[i] += u32::from(fits);
-                lost[i] += u32::from(speeds.is_open(row, i) & !fits);
-            }
-        }
-        Cells { lengths: lengths.iter().sum(), count: counts.iter().sum(), lost: lost.iter().sum() }
-    }
-}
 
 /// A number as a tensor, for interpolation.
 fn scalar(value: f64) -> Sym2 {
