@@ -30,7 +30,7 @@ struct Target {
     read: fn(&Path) -> Result<String>,
 }
 
-const TARGETS: [Target; 8] = [
+const TARGETS: [Target; 9] = [
     Target { name: "tiff", file: "dem.tif", read: open },
     Target { name: "bands", file: "cost.tif", read: bands },
     Target { name: "ascii_grid", file: "dem.asc", read: open },
@@ -39,6 +39,7 @@ const TARGETS: [Target; 8] = [
     Target { name: "nurbs", file: "surface.json", read: nurbs },
     Target { name: "geojson", file: "wall.geojson", read: geojson },
     Target { name: "wkt", file: "dem.prj", read: wkt },
+    Target { name: "aux_xml", file: "dem.tif.aux.xml", read: aux_xml },
 ];
 
 /// Opens a DEM and takes its corners to longitude and latitude and back.
@@ -99,6 +100,15 @@ fn wkt(path: &Path) -> Result<String> {
     if !grid.exists() {
         let header = "ncols 2\nnrows 2\nxllcorner 500000\nyllcorner 4700000\ncellsize 10\n";
         fs::write(&grid, format!("{header}1 2\n3 4\n")).unwrap();
+    }
+    open(&grid)
+}
+
+/// Opens a small GeoTIFF next to which the `.aux.xml` lies.
+fn aux_xml(path: &Path) -> Result<String> {
+    let grid = path.with_file_name("dem.tif");
+    if !grid.exists() {
+        fs::write(&grid, include_bytes!("../fuzz/corpus/tiff/plain.tif")).unwrap();
     }
     open(&grid)
 }

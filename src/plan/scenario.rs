@@ -265,25 +265,27 @@ fn read_barriers(
 
 /// What the user should know of a barrier that touches these cells.
 fn note_of_barrier(shapes: &Shapes, touched: &[bool], terrain: &Terrain) -> Option<&'static str> {
-    let mut stopped =
-        terrain.heights().iter().zip(touched).filter(|&(_, &touched)| touched).peekable();
+    let heights = terrain.heights();
+    let mut stopped = (0..heights.len()).filter(|&node| touched[node]).peekable();
     if stopped.peek().is_none() {
         Some("lies outside the DEM and stops nothing")
-    } else if stopped.all(|(height, _)| height.is_nan()) {
+    } else if stopped.all(|node| heights[node].is_nan()) {
         Some("lies on voids, which nobody enters anyway, and stops nothing")
-    } else if shapes.polygons.iter().any(is_flat) {
+    } else if shapes.polygons.iter().any(|polygon| is_flat(polygon, touched, terrain.frame())) {
         Some("has an area without an inside: it stops where its border runs only")
     } else {
         None
     }
 }
 
-/// Whether the outer border of a polygon surrounds nothing.
-fn is_flat(polygon: &Polygon<f64>) -> bool {
+/// Whether the outer border of a polygon surrounds nothing: no area, and none of the nodes that it touches, as that of a bow tie does.
+fn is_flat(polygon: &Polygon<f64>, touched: &[bool], frame: &GridFrame) -> bool {
     /// Square cells, far less than matters and more than rounding leaves.
     const SMALLEST: f64 = 1e-6;
     let double: f64 = polygon.exterior().lines().map(|side| side.determinant()).sum();
-    double.abs() < SMALLEST
+    let area = Shapes::from(polygon.clone());
+    let node = |i: usize| DVec2::new((i % frame.cols()) as f64, (i / frame.cols()) as f64);
+    double.abs() < SMALLEST && !(0..touched.len()).any(|i| touched[i] && area.contains(node(i)))
 }
 
 /// Cells that are neither void nor barrier.
@@ -443,5 +445,7 @@ mod tests {
         assert!(on_void[0].contains("lies on voids"), "{on_void:?}");
         let flat = notes("Polygon", &[[3.0, 1.0], [5.0, 3.0], [4.0, 2.0], [3.0, 1.0]]);
         assert!(flat[0].contains("without an inside"), "{flat:?}");
+        let bow_tie = [[2.0, 0.2], [6.0, 3.8], [6.0, 0.2], [2.0, 3.8], [2.0, 0.2]];
+        assert_eq!(notes("Polygon", &bow_tie), [""; 0]);
     }
 }
