@@ -9,7 +9,7 @@ use super::formats::{self, ReadMode};
 use super::raster::{HeightUnit, Source, void_infinite};
 use super::{Crs, Georeference};
 use crate::error::{Error, Result};
-use crate::grid::GridFrame;
+use crate::grid::{GridFrame, Ground};
 use crate::linalg::bilinear::{CORNERS, corner_weights};
 
 /// Heights at the nodes of a grid, in metres; `NaN` marks a void.
@@ -86,6 +86,7 @@ impl Terrain {
         terrain.notes.extend(terrain.crs().caveat().map(str::to_owned));
         terrain.notes.extend(terrain.note_of_unknown_projection());
         terrain.notes.extend(terrain.note_of_distortion());
+        terrain.notes.extend(note_of_pole(terrain.frame()));
         Ok(terrain)
     }
 
@@ -220,6 +221,22 @@ impl Terrain {
     }
 }
 
+/// A note if a grid in degrees comes so near to a pole that the length of a cell changes by much from row to row.
+fn note_of_pole(frame: &GridFrame) -> Option<String> {
+    /// Rows; measured on level ground at 1° and ¼°, against geodesics.
+    const NEAR: f64 = 20.0;
+    let last = frame.to_map(DVec2::new(0.0, (frame.rows() - 1) as f64)).y;
+    let highest = frame.origin().y.abs().max(last.abs());
+    let is_near = matches!(frame.ground(), Ground::Ellipsoid { .. })
+        && highest + NEAR * frame.step().y > 90.0;
+    is_near.then(|| {
+        format!(
+            "within {NEAR} rows of a pole distances may be 10 % off, within 4 rows more; \
+             reproject the DEM to a polar stereographic map for those"
+        )
+    })
+}
+
 /// Sums over heights; voids do not count.
 struct Statistics {
     count: usize,
@@ -253,7 +270,6 @@ impl Statistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::grid::Ground;
 
     fn frame(cols: usize, rows: usize) -> GridFrame {
         GridFrame::new(cols, rows, DVec2::ZERO, DVec2::ONE, Ground::METRES).unwrap()
@@ -279,6 +295,17 @@ mod tests {
         assert_eq!([height(0.5, 0.5), height(1.0, 0.0), height(2.0, 1.0)], [15.0, 10.0, 40.0]);
         assert_eq!([height(-3.0, 9.0), height(1.25, 1.0)], [20.0, 32.5]);
         assert!(height(1.5, 0.5).is_nan() && height(2.0, 0.0).is_nan());
+    }
+
+    #[test]
+    fn grids_near_a_pole_get_a_note() {
+        let note = |north: f64, step: f64| {
+            let origin = DVec2::new(10.0, north);
+            let frame = GridFrame::new(9, 11, origin, DVec2::splat(step), Ground::WGS84).unwrap();
+            note_of_pole(&frame).is_some()
+        };
+        assert!(note(90.0, 1.0) && note(-79.5, 1.0) && note(85.0, 0.5));
+        assert!(!note(69.0, 1.0) && !note(85.0, 0.1));
     }
 
     #[test]
