@@ -227,8 +227,10 @@ fn note_of_pole(frame: &GridFrame) -> Option<String> {
     const NEAR: f64 = 20.0;
     let last = frame.to_map(DVec2::new(0.0, (frame.rows() - 1) as f64)).y;
     let highest = frame.origin().y.abs().max(last.abs());
+    // From row to row the length of a cell changes by tan(latitude) × step: near a pole, one over the number of rows to it.
+    let change = highest.to_radians().tan() * frame.step().y.to_radians();
     let is_near = matches!(frame.ground(), Ground::Ellipsoid { .. })
-        && highest + NEAR * frame.step().y > 90.0;
+        && (highest >= 90.0 || change > 1.0 / NEAR);
     is_near.then(|| {
         format!(
             "within {NEAR} rows of a pole distances may be 10 % off, within 4 rows more; \
