@@ -237,7 +237,14 @@ impl Foot {
     #[inline(always)]
     fn smooth_share<const IS_WEIGHTED: bool>(&self, t: f32) -> f32 {
         let beside = open(self.beside, self.own);
-        let (own, beside) = (self.own.at(t), beside.at(t));
+        let (mut own, mut beside) = (self.own.at(t), beside.at(t));
+        if IS_WEIGHTED {
+            // Where the heights bend at `a`, the climb goes on from the other side by another slope.
+            let [at_a, at_b, at_c] = self.climb;
+            let (climb, straight) = (at_a + t * (at_b - at_a), at_a + t * (at_a - at_c));
+            own += climb * climb;
+            beside += straight * straight;
+        }
         let mut ratio = (greatest(own, beside) / least(own, beside)).sqrt();
         if IS_WEIGHTED {
             ratio = greatest(ratio, self.cost_ratio);
