@@ -241,7 +241,7 @@ fn high_accuracy_estimates_its_error() {
     let folder = Folder::new();
     let line = "distance range.tif --start pixel:5,5 --metric isotropic -o d.tif --error --stats";
     let text = folder.good(&format!("{line} --accuracy high"));
-    for part in ["mean estimated error", " sweeps per node, ", "24 bytes per node"] {
+    for part in ["mean estimated error", " sweeps per node, ", "37 bytes per node"] {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(is_tiff(&folder.path("d.tif")));

@@ -4,7 +4,7 @@
 //! (`stencil/`) and iterates it until it converges, tile by tile (`tile/`), in order of distance (`schedule/`). First order
 //! in the spacing, also near the start, where source factoring removes the singularity (`stencil/factoring.rs`); second order by deferred
 //! correction if asked for ([`Accuracy`], `second_order/`). Walls one node thick do not leak, also diagonally. Cost: 30 to 60
-//! ns of one core and 16 bytes per node, at high accuracy 80 to 150 ns and 24 bytes. [`mod@reference`] is the
+//! ns of one core and 16 to 40 bytes per node, at high accuracy 80 to 150 ns and 8 more. [`mod@reference`] is the
 //! slow solver that tests compare with; `docs/solver.md` has the measurements.
 
 mod allocation;
