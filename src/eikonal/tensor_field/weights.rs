@@ -5,8 +5,9 @@ use rayon::prelude::*;
 
 use super::TensorField;
 use super::prices::WeightTile;
-use crate::grid::tiling::PADDED;
+use crate::grid::tiling::{AREA, PADDED, SIDE};
 use crate::metric::MetricField;
+use crate::surface::{Block, Jet, JetBlock, Surface};
 
 impl TensorField {
     /// Takes over what a metric weighs steps by.
@@ -16,8 +17,7 @@ impl TensorField {
         }
         let (tiling, surface) = (self.tiling, metric.surface());
         let climb = metric.climb_weight().sqrt() * self.root_scale;
-        // Only differences count; `f32` holds those of heights above the first node best.
-        let level = surface.point(DVec2::ZERO).z;
+        let rises = if climb > 0.0 { self.rises(surface, climb) } else { Vec::new() };
         let weights = |tile: usize| {
             let mut weights = WeightTile::NONE;
             for (k, owner) in tiling.places_around(tile).enumerate() {
@@ -25,13 +25,32 @@ impl TensorField {
                 let (col, row) = tiling.node_at(tile, place);
                 let (i, j) = (k % PADDED, k / PADDED);
                 weights.cost[j][i] = metric.node_cost(col, row) as f32;
-                if climb > 0.0 {
-                    let z = surface.point(DVec2::new(col as f64, row as f64)).z;
-                    weights.rise[j][i] = ((z - level) * climb) as f32;
-                }
+                weights.rise[j][i] = rises.get(tile).map_or(0.0, |rises| rises[place]);
             }
             weights
         };
         self.weights = (0..tiling.tiles()).into_par_iter().map(weights).collect();
+    }
+
+    /// Heights times `climb`, tile by tile.
+    fn rises(&self, surface: &dyn Surface, climb: f64) -> Vec<[f32; AREA]> {
+        // Only differences count; `f32` holds those of heights above the first node best.
+        let level = surface.point(DVec2::ZERO).z;
+        let tile = |jets: &mut JetBlock, tile: usize| {
+            let mut rises = [0.0; AREA];
+            let (col, row) = self.tiling.node_at(tile, 0);
+            let block = Block::from(surface, col, row);
+            surface.block_jets(&block, jets);
+            for (j, i, _) in block.places() {
+                let z = match jets.get(j, i) {
+                    Jet::Height(jet) => jet.z,
+                    Jet::Space(jet) => jet.point.z,
+                };
+                rises[j * SIDE + i] = ((z - level) * climb) as f32;
+            }
+            rises
+        };
+        let tiles = (0..self.tiling.tiles()).into_par_iter();
+        tiles.map_init(JetBlock::default, tile).collect()
     }
 }

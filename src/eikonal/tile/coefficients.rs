@@ -103,8 +103,11 @@ impl<const T: usize> CellLine<T> {
             return;
         }
         let Some(weights) = tile.prices.weights else { return };
-        let [near, far] = [line, line + 1].map(|line| block_line(&weights.rise, line, by_columns));
-        let [cost, next] = [line, line + 1].map(|line| block_line(&weights.cost, line, by_columns));
+        // Not `map`, as in `lanes`.
+        let near = block_line(&weights.rise, line, by_columns);
+        let far = block_line(&weights.rise, line + 1, by_columns);
+        let cost = block_line(&weights.cost, line, by_columns);
+        let next = block_line(&weights.cost, line + 1, by_columns);
         let mut most = [0.0; CELLS];
         for i in 0..CELLS {
             for corner in [cost[i], cost[i + 1], next[i], next[i + 1]] {
@@ -377,9 +380,11 @@ impl LineCosts {
 #[inline(always)]
 pub(crate) fn line_costs(tile: &Tile<'_>, line: usize, by_columns: bool) -> LineCosts {
     let Some(weights) = tile.prices.weights else { return LineCosts::ONE };
-    let lines = [line, line + 1, line + 2].map(|line| block_line(&weights.cost, line, by_columns));
-    let own = lanes(&lines[1], 1);
-    let mut ring = rings([&lines[0], &lines[1], &lines[2]], 1);
+    let before = block_line(&weights.cost, line, by_columns);
+    let at = block_line(&weights.cost, line + 1, by_columns);
+    let after = block_line(&weights.cost, line + 2, by_columns);
+    let own = lanes(&at, 1);
+    let mut ring = rings([&before, &at, &after], 1);
     for b in [1, 3, 5, 7] {
         for i in 0..SIDE {
             ring[b][i] = diagonal_cost(own[i], ring[b - 1][i], ring[b][i], ring[(b + 1) % 8][i]);
