@@ -152,6 +152,10 @@ impl<'a> MetricField<'a> {
             return;
         };
         let block = Block { centres: true, ..Block::from(self.surface, col, row) };
+        if self.modifiers.close_cells(&block) {
+            speeds.det = Default::default();
+            return;
+        }
         let mut jets = mem::take(&mut speeds.jets);
         self.surface.block_jets(&block, &mut jets);
         tensor.block(&block, &jets, speeds);
@@ -187,6 +191,10 @@ impl<'a> MetricField<'a> {
             return;
         };
         let block = Block::from(self.surface, col, row);
+        if self.modifiers.close_all(&block) {
+            speeds.det = Default::default();
+            return;
+        }
         let mut jets = mem::take(&mut speeds.jets);
         self.surface.block_jets(&block, &mut jets);
         tensor.block(&block, &jets, speeds);

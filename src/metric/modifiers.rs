@@ -127,6 +127,9 @@ impl Modifiers {
 fn close_steep(surface: &dyn Surface, row: usize, steepest: f64, open: &mut [bool]) {
     let mut jets = JetBlock::default();
     for (k, open) in open.chunks_mut(BLOCK).enumerate() {
+        if !open.contains(&true) {
+            continue;
+        }
         let first = k * BLOCK;
         let block = Block { cols: first..first + open.len(), rows: row..row + 1, centres: false };
         surface.block_jets(&block, &mut jets);
@@ -166,6 +169,17 @@ impl BoundModifiers {
 
     pub(super) fn is_open(&self, col: usize, row: usize) -> bool {
         self.open.is_empty() || self.open[self.nodes.index(col, row)]
+    }
+
+    /// Whether all nodes of a block are closed.
+    pub(super) fn close_all(&self, block: &Block) -> bool {
+        !self.open.is_empty() && self.nodes.of_block(&self.open, block).all(|(_, _, open)| !open)
+    }
+
+    /// Whether all corners of the cells of a block are closed; false if it is not known.
+    pub(super) fn close_cells(&self, block: &Block) -> bool {
+        let Some([cols, rows]) = self.nodes.with_far_corners(block) else { return false };
+        self.close_all(&Block { cols, rows, centres: false })
     }
 
     /// A speed tensor, with its determinant, under the modifiers.

@@ -1,6 +1,6 @@
 //! What is known at the nodes only, and bilinear between them.
 
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 use glam::DVec2;
 
@@ -23,6 +23,13 @@ impl Nodes {
 
     pub(super) fn index(&self, col: usize, row: usize) -> usize {
         row * self.counts[0] + col
+    }
+
+    /// The columns and rows of the corners of cells whose north-west corners are the nodes of a block; `None` if the grid is periodic.
+    pub(super) fn with_far_corners(&self, block: &Block) -> Option<[Range<usize>; 2]> {
+        let corners =
+            |nodes: &Range<usize>, axis: usize| nodes.start..self.counts[axis].min(nodes.end + 1);
+        (self.periodic == [false; 2]).then(|| [corners(&block.cols, 0), corners(&block.rows, 1)])
     }
 
     /// The values of a raster at the nodes of a block, row by row within it, each with column and value.

@@ -41,15 +41,40 @@ impl Banded {
         }
     }
 
+    /// The matrix of order `n` whose last `ends` rows are those of this one, the rows before its first: the same equations on
+    /// a shorter axis, if inner rows are alike.
+    pub(in crate::surface) fn shortened(&self, n: usize, ends: usize) -> Self {
+        let (first, last) = (&self.rows[..n - ends], &self.rows[self.rows.len() - ends..]);
+        Self { rows: [first, last].concat() }
+    }
+
     /// Factors the matrix, whose entries lie within `band` of the diagonal (Golub and Van Loan, Matrix
     /// Computations, 4.3.5). A pivot lost to rounding is held at `ε` times its diagonal entry, which
     /// pins what the data leave undetermined.
     pub(in crate::surface) fn factor(self, band: usize) -> Ldl {
-        let mut lower = self.rows;
-        for i in 0..lower.len() {
+        let mut factors = Ldl { lower: self.rows, band };
+        factors.factor_from(0);
+        factors
+    }
+}
+
+impl Ldl {
+    /// The factors of the matrix of order `n` whose last `ends` rows are those of `matrix`, the rows before its first; these are its
+    /// own factors.
+    pub(in crate::surface) fn shortened(&self, matrix: &Banded, n: usize, ends: usize) -> Self {
+        let (first, last) = (&self.lower[..n - ends], &matrix.rows[matrix.rows.len() - ends..]);
+        let mut factors = Self { lower: [first, last].concat(), band: self.band };
+        factors.factor_from(n - ends);
+        factors
+    }
+
+    /// Factors the rows from one on, which still are those of the matrix.
+    fn factor_from(&mut self, first: usize) {
+        let lower = &mut self.lower;
+        for i in first..lower.len() {
             let mut row = lower[i];
             let diagonal = row[0];
-            let reach = band.min(i);
+            let reach = self.band.min(i);
             // row[d] becomes L_ij D_j, from the far end of the band to the diagonal; j = i − d.
             for d in (1..=reach).rev() {
                 for e in d + 1..=reach {
@@ -65,11 +90,8 @@ impl Banded {
             row[0] = 1.0 / pivot.max(f64::EPSILON * diagonal).max(f64::MIN_POSITIVE);
             lower[i] = row;
         }
-        Ldl { lower, band }
     }
-}
 
-impl Ldl {
     /// Solves `A X = B` in place for `W` right-hand sides side by side.
     pub(in crate::surface) fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
         let lower = &self.lower;

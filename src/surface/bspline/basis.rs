@@ -1,5 +1,7 @@
 //! Uniform B-splines along one axis: which coefficients bear on a point, and with what weights.
 
+use std::ops::Range;
+
 /// Most coefficients that bear on one point: degree 5 plus 1.
 pub(in crate::surface) const SUPPORT: usize = 6;
 
@@ -27,6 +29,8 @@ pub(in crate::surface) struct Basis {
     intervals: usize,
     /// Knot intervals per node.
     density: f64,
+    /// The knot of its axis where it begins.
+    first: usize,
 }
 
 /// The coefficients that bear on one point.
@@ -43,7 +47,12 @@ impl Basis {
     pub(in crate::surface) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
         debug_assert!(intervals < nodes && degree % 2 == 1 && degree < SUPPORT);
         let density = if nodes > 1 { intervals as f64 / (nodes - 1) as f64 } else { 1.0 };
-        Self { degree, intervals, density }
+        Self { degree, intervals, density, first: 0 }
+    }
+
+    /// The splines over a run of the knots.
+    pub(in crate::surface) fn section(&self, run: &Range<usize>) -> Self {
+        Self { intervals: run.len() - 1, first: self.first + run.start, ..*self }
     }
 
     /// Degree of the splines.
@@ -61,6 +70,11 @@ impl Basis {
         self.intervals
     }
 
+    /// The place `u` into an interval between knots, counted in nodes.
+    pub(in crate::surface) fn node(&self, interval: usize, u: f64) -> f64 {
+        ((self.first + interval) as f64 + u) / self.density
+    }
+
     /// Knot intervals per node, at most 1.
     pub(in crate::surface) fn density(&self) -> f64 {
         self.density
@@ -73,7 +87,7 @@ impl Basis {
 
     /// The coefficients and weights at `t`, counted in nodes.
     pub(in crate::surface) fn at(&self, t: f64) -> Local {
-        let x = t * self.density;
+        let x = t * self.density - self.first as f64;
         let knot = (x.max(0.0) as usize).min(self.intervals.saturating_sub(1));
         let reach = (self.degree - 1) / 2;
         let first = knot as isize - reach as isize;

@@ -202,6 +202,7 @@ fn accumulate(sum: &mut Lanes, weight: f64, values: &Lanes) {
 #[cfg(test)]
 mod tests {
     use super::super::knots::FitPlan;
+    use super::super::voids::fit_finite;
     use super::*;
     use crate::control::Control;
     use crate::grid::{GridFrame, Ground};
@@ -212,7 +213,7 @@ mod tests {
         let heights: Vec<f64> = (0..frame.nodes()).map(|i| (i as f64).sin() * 1e3).collect();
         for degree in [3, 5] {
             let plan = FitPlan::every_node(&frame, degree);
-            let fit = Fit::new(&frame, &heights, &plan, &Control::default()).unwrap();
+            let fit = fit_finite(&frame, &heights, &plan, &Control::default()).unwrap();
             assert!(fit.x.uniform.contains(&16) && fit.x.uniform.contains(&31));
             let mut jets = HeightBlock::default();
             fit.jets(&[DVec2::ONE; 21], 16, 2..18, false, &mut jets);

@@ -32,6 +32,8 @@ use rayon::prelude::*;
 
 use super::banded::{Banded, Ldl};
 use super::basis::{Basis, Local, SUPPORT};
+use super::continuation::Continued;
+use super::domain::{Domain, nodes_of};
 use super::knots::FitPlan;
 use crate::control::Control;
 use crate::error::Result;
@@ -47,7 +49,7 @@ const STAGE: &str = "fitting surface";
 const LONGEST_CUTOFF: f64 = 64.0;
 
 /// Columns, or rows, that are solved together.
-pub(in crate::surface) const LANES: usize = 16;
+const LANES: usize = 16;
 
 /// Relative difference of cut-offs up to which rows share one: a wave at the cut-off keeps 0.5 ± 0.0015 of its amplitude.
 const SHARED_CUTOFF_TOLERANCE: f64 = 1e-3;
@@ -65,43 +67,47 @@ pub(in crate::surface) struct Axis {
     pub(in crate::surface) uniform_centres: Range<usize>,
     /// `Σ_i v_i v_iᵀ` with `v_i` the weights at node `i`.
     gram: Banded,
+    /// Matrix of `∫ s‴(t)² dt`.
+    penalty: Banded,
+}
+
+/// The normal equations of an axis.
+#[derive(Clone)]
+struct Normal<'a> {
+    axis: &'a Axis,
+    /// The cut-off in nodes.
+    cells: f64,
+    matrix: Banded,
+    factors: Ldl,
+}
+
+/// The normal equations on a run of knots of an axis, whose ends are to them what those of the axis are to all of it.
+struct Section<'a> {
+    basis: Basis,
+    /// The nodes between its ends.
+    nodes: Range<usize>,
+    /// The coefficients and weights at the first nodes, and at the last, whose coefficients here come by `moved` sooner.
+    first: Cow<'a, [Local]>,
+    last: &'a [Local],
+    moved: usize,
+    factors: Cow<'a, Ldl>,
 }
 
 impl Axis {
     pub(in crate::surface) fn new(degree: usize, nodes: usize, intervals: usize) -> Self {
         let basis = Basis::new(degree, nodes, intervals);
         let nodes: Vec<Local> = (0..nodes).map(|i| basis.at(i as f64)).collect();
-        let mut gram = Banded::zero(basis.len());
-        for node in &nodes {
-            gram.add_outer(node.start, &node.weights[0][..basis.support()], 1.0);
-        }
+        let penalty = penalty(&basis);
+        let gram = gram(&basis, &nodes);
         let last = nodes.len() as f64 - 1.0;
         let centre = |i: usize| basis.at((i as f64 + 0.5).min(last));
         let centres: Vec<Local> = (0..nodes.len()).map(centre).collect();
         let (uniform, uniform_centres) = (uniform(&nodes), uniform(&centres));
-        Self { basis, nodes, uniform, centres, uniform_centres, gram }
-    }
-
-    /// Matrix of `∫ (d^order s/dt^order)² dt`, by Gauss's three points per interval: exact to degree 5.
-    pub(in crate::surface) fn penalty(&self, order: usize) -> Banded {
-        const GAUSS: [(f64, f64); 3] = [
-            (0.112_701_665_379_258_3, 5.0 / 18.0),
-            (0.5, 8.0 / 18.0),
-            (0.887_298_334_620_741_7, 5.0 / 18.0),
-        ];
-        let mut penalty = Banded::zero(self.basis.len());
-        for k in 0..self.basis.intervals() {
-            for (u, share) in GAUSS {
-                let local = self.basis.at((k as f64 + u) / self.basis.density());
-                let weights = &local.weights[order][..self.basis.support()];
-                penalty.add_outer(local.start, weights, share / self.basis.density());
-            }
-        }
-        penalty
+        Self { basis, nodes, uniform, centres, uniform_centres, gram, penalty }
     }
 
     /// A cut-off of `cells` nodes, kept where the equations are sound.
-    pub(in crate::surface) fn cutoff(&self, cells: f64) -> f64 {
+    fn cutoff(&self, cells: f64) -> f64 {
         // Fewer knots than nodes without smoothing may leave a coefficient almost without data where
         // nodes fall midway between knots; a cut-off of 0.3 intervals holds it and changes nothing otherwise.
         let shortest = if self.basis.len() < self.nodes.len() { 0.3 } else { 0.0 };
@@ -131,16 +137,17 @@ impl Axis {
         lambda * (cutoff / wave / self.basis.density()).powi(6)
     }
 
-    /// Factors of the normal matrix for a cut-off of `cells` nodes.
-    fn normal(&self, penalty: &Banded, cells: f64) -> Ldl {
-        let mut normal = self.gram.clone();
-        normal.add(penalty, self.smoothing(cells));
-        normal.factor(self.basis.support() - 1)
+    /// The normal equations for a cut-off of `cells` nodes.
+    fn normal(&self, cells: f64) -> Normal<'_> {
+        let mut matrix = self.gram.clone();
+        matrix.add(&self.penalty, self.smoothing(cells));
+        let factors = matrix.clone().factor(self.basis.support() - 1);
+        Normal { axis: self, cells, matrix, factors }
     }
 
     /// Trace of the matrix that takes heights to fitted heights.
     pub(in crate::surface) fn trace(&self, cells: f64) -> f64 {
-        let inverse = self.normal(&self.penalty(3), cells).inverse_band();
+        let inverse = self.normal(cells).factors.inverse_band();
         self.nodes.iter().map(|node| self.leverage(node, &inverse)).sum()
     }
 
@@ -151,66 +158,124 @@ impl Axis {
         let row = |i: usize| (0..weights.len()).map(move |j| weights[j] * entry(i, j));
         (0..weights.len()).map(|i| weights[i] * row(i).sum::<f64>()).sum()
     }
+}
 
-    /// Right-hand side of the normal equations: `Σ_i v_i z_i`.
-    fn project<const W: usize>(&self, heights: &[[f64; W]]) -> Vec<[f64; W]> {
-        let (nodes, coefficients) = (&self.nodes, self.basis.len());
-        // The weights beyond a narrow grid's support are 0, but what they are added to must exist.
-        let mut sums = match self.basis.support() {
-            4 => simd::dispatch(Project::<4, W> { nodes, heights, coefficients }),
-            _ => simd::dispatch(Project::<SUPPORT, W> { nodes, heights, coefficients }),
-        };
-        sums.truncate(coefficients);
-        sums
-    }
-
-    /// Heights at all nodes of the fit to the finite heights of a line; `penalty` is that of the
-    /// derivative `order`.
-    pub(in crate::surface) fn complete(
-        &self,
-        penalty: &Banded,
-        order: i32,
-        cells: f64,
-        line: &[f64],
-    ) -> Vec<f64> {
-        let support = self.basis.support();
-        let mut normal = Banded::zero(self.basis.len());
-        let mut x = vec![[0.0]; self.basis.len()];
-        for (node, z) in self.nodes.iter().zip(line).filter(|(_, z)| z.is_finite()) {
-            let weights = &node.weights[0][..support];
-            normal.add_outer(node.start, weights, 1.0);
-            x[node.start..].iter_mut().zip(weights).for_each(|([x], w)| *x += w * z);
+impl Normal<'_> {
+    /// The equations on a run of the knots.
+    fn section(&self, run: &Range<usize>) -> Section<'_> {
+        let Self { axis, cells, matrix, factors } = self;
+        let (basis, locals) = (axis.basis.section(run), &axis.nodes);
+        let nodes = nodes_of(run, basis.density(), locals.len());
+        if run.len() == axis.basis.len() {
+            let (first, factors) = (Cow::Borrowed(&locals[..]), Cow::Borrowed(factors));
+            return Section { basis, nodes, first, last: &[], moved: 0, factors };
         }
-        normal.add(penalty, (self.cutoff(cells) / TAU).powi(2 * order));
-        normal.factor(support - 1).solve(&mut x);
-        let x = x.as_flattened();
-        self.nodes.iter().map(|n| dot(&n.weights[0][..support], &x[n.start..])).collect()
+        // Knots this near an end know of it.
+        let ends = basis.degree() + 1;
+        let is_short = run.len() < 2 * ends;
+        if axis.basis.len() == locals.len() && !is_short {
+            // With a knot at every node all inner equations are alike: those of all knots, less some in the middle.
+            let moved = locals.len() - run.len();
+            let first = Cow::Borrowed(&locals[..run.len() - ends]);
+            let last = &locals[locals.len() - ends..];
+            let factors = Cow::Owned(factors.shortened(matrix, run.len(), ends));
+            return Section { basis, nodes, first, last, moved, factors };
+        }
+        let is_inner = |local: &Local| {
+            basis.support() == axis.basis.support()
+                && local.start >= run.start
+                && local.start + basis.support() <= run.end
+        };
+        let first: Vec<_> = nodes
+            .clone()
+            .map(|i| match &locals[i] {
+                local if is_inner(local) => Local { start: local.start - run.start, ..*local },
+                _ => basis.at(i as f64),
+            })
+            .collect();
+        let penalty = match is_short {
+            true => penalty(&basis),
+            false => axis.penalty.shortened(run.len(), ends),
+        };
+        let mut matrix = gram(&basis, &first);
+        matrix.add(&penalty, axis.smoothing(*cells));
+        let factors = Cow::Owned(matrix.factor(basis.support() - 1));
+        Section { basis, nodes, first: Cow::Owned(first), last: &[], moved: 0, factors }
     }
 }
 
-/// At least `coefficients` sums `Σ_i v_i z_i` of heights with the first `N` weights at their nodes.
+impl Section<'_> {
+    /// The coefficients of the splines fitted to heights at the nodes.
+    fn fit<const W: usize>(&self, heights: &[[f64; W]]) -> Vec<[f64; W]> {
+        let (coefficients, support) = (self.basis.len(), self.basis.support());
+        // The weights beyond a narrow grid's support are 0, but what they are added to must exist.
+        let mut sums = vec![[0.0; W]; coefficients.max(SUPPORT)];
+        let (first, last) = heights.split_at(self.first.len());
+        for (nodes, heights, moved) in [(&self.first[..], first, 0), (self.last, last, self.moved)]
+        {
+            let sums = &mut sums[..];
+            match support {
+                4 => simd::dispatch(Project::<4, W> { nodes, heights, moved, sums }),
+                _ => simd::dispatch(Project::<SUPPORT, W> { nodes, heights, moved, sums }),
+            }
+        }
+        sums.truncate(coefficients);
+        self.factors.solve(&mut sums);
+        sums
+    }
+}
+
+/// `Σ_i v_i v_iᵀ` with `v_i` the weights at node `i`.
+fn gram(basis: &Basis, nodes: &[Local]) -> Banded {
+    let mut gram = Banded::zero(basis.len());
+    for node in nodes {
+        gram.add_outer(node.start, &node.weights[0][..basis.support()], 1.0);
+    }
+    gram
+}
+
+/// Matrix of `∫ s‴(t)² dt`, by Gauss's three points per interval: exact to degree 5.
+fn penalty(basis: &Basis) -> Banded {
+    const GAUSS: [(f64, f64); 3] = [
+        (0.112_701_665_379_258_3, 5.0 / 18.0),
+        (0.5, 8.0 / 18.0),
+        (0.887_298_334_620_741_7, 5.0 / 18.0),
+    ];
+    let mut penalty = Banded::zero(basis.len());
+    for k in 0..basis.intervals() {
+        for (u, share) in GAUSS {
+            let local = basis.at(basis.node(k, u));
+            let weights = &local.weights[3][..basis.support()];
+            penalty.add_outer(local.start, weights, share / basis.density());
+        }
+    }
+    penalty
+}
+
+/// Adds the right-hand side of the normal equations to `sums`: `Σ_i v_i z_i`, of heights `z` with the first `N` weights `v` at their
+/// nodes, whose coefficients come by `moved` sooner.
 struct Project<'a, const N: usize, const W: usize> {
     nodes: &'a [Local],
     heights: &'a [[f64; W]],
-    coefficients: usize,
+    moved: usize,
+    sums: &'a mut [[f64; W]],
 }
 
 impl<const N: usize, const W: usize> Kernel for Project<'_, N, W> {
-    type Output = Vec<[f64; W]>;
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
-        let Self { nodes, heights, coefficients } = self;
-        let mut sums = vec![[0.0; W]; if coefficients > N { coefficients } else { N }];
+    fn run(self) {
+        let Self { nodes, heights, moved, sums } = self;
         for (node, z) in nodes.iter().zip(heights) {
-            let sums = &mut sums[node.start..node.start + N];
+            let start = node.start - moved;
+            let sums = &mut sums[start..start + N];
             for (sum, weight) in sums.iter_mut().zip(&node.weights[0]) {
                 for i in 0..W {
                     sum[i] += weight * z[i];
                 }
             }
         }
-        sums
     }
 }
 
@@ -220,14 +285,17 @@ pub(in crate::surface) struct Fit {
     pub(in crate::surface) x: Axis,
     pub(in crate::surface) y: Axis,
     pub(in crate::surface) coefficients: Vec<f64>,
+    /// Where it has coefficients; they are 0 elsewhere.
+    pub(in crate::surface) domain: Domain,
 }
 
 impl Fit {
-    /// Fits heights without voids.
+    /// Fits the heights in a domain.
     pub(in crate::surface) fn new(
         frame: &GridFrame,
-        heights: &[f64],
+        heights: &Continued<'_>,
         plan: &FitPlan,
+        domain: Domain,
         control: &Control,
     ) -> Result<Self> {
         let x = Axis::new(plan.degree, frame.cols(), plan.intervals[0]);
@@ -235,38 +303,56 @@ impl Fit {
         let width = x.basis.len();
         control.report(STAGE, 0.0);
         let mut coefficients = vec![0.0; frame.rows() * width];
-        solve_rows(frame, &x, plan.cutoff, heights, &mut coefficients, control)?;
+        solve_rows(frame, &x, plan.cutoff, heights, &domain, &mut coefficients, control)?;
         control.report(STAGE, 0.5);
         let cells = plan.cutoff / frame.mid_spacing().y;
-        solve_columns(&y, cells, &mut coefficients, width, control)?;
+        solve_columns(&y, cells, &domain, &mut coefficients, width, control)?;
         coefficients.truncate(width * y.basis.len());
         coefficients.shrink_to_fit();
         control.report(STAGE, 1.0);
-        Ok(Self { x, y, coefficients })
+        Ok(Self { x, y, coefficients, domain })
     }
 
-    /// Values at the nodes of a row.
-    pub(in crate::surface) fn row_values(&self, row: usize, values: &mut [f64]) {
+    /// Values at the nodes in the columns `cols` of a row, into those places of `values`.
+    pub(in crate::surface) fn row_values(
+        &self,
+        row: usize,
+        cols: Range<usize>,
+        values: &mut [f64],
+    ) {
         let (width, support) = (self.x.basis.len(), self.x.basis.support());
         let node = &self.y.nodes[row];
-        let mut line = vec![0.0; width];
+        let [first, last] = [cols.start, cols.end - 1].map(|col| self.x.nodes[col].start);
+        let mut line = vec![0.0; last + support - first];
         for (k, weight) in node.weights[0][..self.y.basis.support()].iter().enumerate() {
-            let coefficients = &self.coefficients[(node.start + k) * width..][..width];
+            let coefficients = &self.coefficients[(node.start + k) * width + first..];
             line.iter_mut().zip(coefficients).for_each(|(sum, c)| *sum += weight * c);
         }
-        let value = |node: &Local| dot(&node.weights[0][..support], &line[node.start..]);
-        let uniform = self.x.uniform.clone();
-        for col in (0..uniform.start).chain(uniform.end..values.len()) {
+        let value = |node: &Local| dot(&node.weights[0][..support], &line[node.start - first..]);
+        let uniform = self.x.uniform.start.clamp(cols.start, cols.end)
+            ..self.x.uniform.end.clamp(cols.start, cols.end);
+        for col in (cols.start..uniform.start).chain(uniform.end..cols.end) {
             values[col] = value(&self.x.nodes[col]);
         }
-        let Some(node) = self.x.nodes.get(uniform.start) else { return };
-        let windows = line[node.start..].windows(support);
+        if uniform.is_empty() {
+            return;
+        }
+        let node = &self.x.nodes[uniform.start];
+        let windows = line[node.start - first..].windows(support);
         for (value, window) in values[uniform].iter_mut().zip(windows) {
             *value = dot(&node.weights[0][..support], window);
         }
     }
 
-    /// `z` differentiated `orders[k]` times along columns and rows, per node, at grid coordinates `at`.
+    /// Whether there are all coefficients that bear on a point.
+    pub(in crate::surface) fn is_complete(&self, x: &Local, y: &Local) -> bool {
+        let columns = x.start..x.start + self.x.basis.support();
+        let rows = y.start..y.start + self.y.basis.support();
+        self.domain.is_whole || self.domain.holds(&columns, rows)
+    }
+
+    /// `z` differentiated `orders[k]` times along columns and rows, per node, at grid coordinates `at`. Not a number where a
+    /// coefficient is missing.
     pub(in crate::surface) fn derivatives<const K: usize>(
         &self,
         at: DVec2,
@@ -274,6 +360,9 @@ impl Fit {
     ) -> [f64; K] {
         let (x, y) = (self.x.basis.at(at.x), self.y.basis.at(at.y));
         let support = self.x.basis.support();
+        if !self.is_complete(&x, &y) {
+            return [f64::NAN; K];
+        }
         orders.map(|[i, j]| {
             (0..self.y.basis.support())
                 .map(|k| {
@@ -302,57 +391,77 @@ pub(in crate::surface) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Fits every row of heights: as many rows of `coefficients`.
 ///
-/// [`LANES`] rows are solved together. Where meridians converge their cells differ in width; they share the cut-off in
-/// cells of the middle one if that changes none by more than [`SHARED_CUTOFF_TOLERANCE`].
+/// [`LANES`] rows are solved together, if they have the same runs of knots. Where meridians converge their cells differ in
+/// width; they share the cut-off in cells of the middle one if that changes none by more than [`SHARED_CUTOFF_TOLERANCE`].
 fn solve_rows(
     frame: &GridFrame,
     axis: &Axis,
     cutoff: f64,
-    heights: &[f64],
+    heights: &Continued<'_>,
+    domain: &Domain,
     coefficients: &mut [f64],
     control: &Control,
 ) -> Result<()> {
-    let (cols, width) = (frame.cols(), axis.basis.len());
     let cells = |row: usize| if cutoff > 0.0 { cutoff / frame.spacing(row as f64).x } else { 0.0 };
-    let penalty = axis.penalty(3);
-    let top = axis.normal(&penalty, cells(0));
+    let top = axis.normal(cells(0));
     let normal = |cells_there: f64| match cells_there == cells(0) {
         true => Cow::Borrowed(&top),
-        false => Cow::Owned(axis.normal(&penalty, cells_there)),
+        false => Cow::Owned(axis.normal(cells_there)),
     };
-    let groups = heights.par_chunks(LANES * cols).zip(coefficients.par_chunks_mut(LANES * width));
-    groups.enumerate().try_for_each(|(group, (heights, coefficients))| {
+    let width = axis.basis.len();
+    let groups = coefficients.par_chunks_mut(LANES * width);
+    groups.enumerate().try_for_each(|(group, coefficients)| {
         control.check()?;
-        let (first, count) = (group * LANES, heights.len() / cols);
+        let (first, count) = (group * LANES, coefficients.len() / width);
+        let runs: Vec<_> = (first..first + count).map(|row| domain.runs_at(row)).collect();
         let shared = cells(first + count / 2);
         let spread = (cells(first) - shared).abs().max((cells(first + count - 1) - shared).abs());
-        if spread <= SHARED_CUTOFF_TOLERANCE * shared {
-            solve_lines::<LANES>(axis, &normal(shared), heights, coefficients);
-        } else {
-            let rows = heights.chunks(cols).zip(coefficients.chunks_mut(width));
-            for (i, (heights, coefficients)) in rows.enumerate() {
-                solve_lines::<1>(axis, &normal(cells(first + i)), heights, coefficients);
+        let one_cutoff = spread <= SHARED_CUTOFF_TOLERANCE * shared;
+        let of_group = one_cutoff.then(|| normal(shared));
+        let one_domain = runs.iter().all(|of_row| *of_row == runs[0]);
+        match &of_group {
+            Some(normal) if one_domain => {
+                solve_lines::<LANES>(normal, first, &runs[0], heights, coefficients);
+            }
+            _ => {
+                let rows = coefficients.chunks_mut(width).zip(runs);
+                for (row, (coefficients, runs)) in (first..).zip(rows) {
+                    match &of_group {
+                        Some(normal) => solve_lines::<1>(normal, row, &runs, heights, coefficients),
+                        None => {
+                            solve_lines::<1>(&normal(cells(row)), row, &runs, heights, coefficients)
+                        }
+                    }
+                }
             }
         }
         Ok(())
     })
 }
 
-/// Fits at most `W` rows side by side.
+/// Fits at most `W` rows from `first` on side by side, on runs of knots that they share: as many rows of `coefficients`.
 fn solve_lines<const W: usize>(
-    axis: &Axis,
-    normal: &Ldl,
-    heights: &[f64],
+    normal: &Normal<'_>,
+    first: usize,
+    runs: &[Range<usize>],
+    heights: &Continued<'_>,
     coefficients: &mut [f64],
 ) {
-    let mut lanes = vec![[0.0; W]; axis.nodes.len()];
-    for (i, row) in heights.chunks(axis.nodes.len()).enumerate() {
-        lanes.iter_mut().zip(row).for_each(|(lanes, z)| lanes[i] = *z);
-    }
-    let mut x = axis.project(&lanes);
-    normal.solve(&mut x);
-    for (i, row) in coefficients.chunks_mut(x.len()).enumerate() {
-        row.iter_mut().zip(&x).for_each(|(coefficient, lanes)| *coefficient = lanes[i]);
+    let width = normal.axis.basis.len();
+    let count = coefficients.len() / width;
+    let mut rows: Vec<_> = (first..first + count).map(|row| heights.row(row)).collect();
+    for run in runs {
+        let section = normal.section(run);
+        let mut lanes = vec![[0.0; W]; section.nodes.len()];
+        for (i, row) in rows.iter_mut().enumerate() {
+            let heights = row.heights(section.nodes.clone());
+            lanes.iter_mut().zip(heights).for_each(|(lanes, z)| lanes[i] = z);
+        }
+        let x = section.fit(&lanes);
+        for (i, row) in coefficients.chunks_mut(width).enumerate() {
+            let row = &mut row[run.clone()];
+            row.iter_mut().zip(&x).for_each(|(coefficient, lanes)| *coefficient = lanes[i]);
+        }
     }
 }
 
@@ -360,28 +469,48 @@ fn solve_lines<const W: usize>(
 fn solve_columns(
     axis: &Axis,
     cells: f64,
+    domain: &Domain,
     values: &mut [f64],
     width: usize,
     control: &Control,
 ) -> Result<()> {
-    let normal = axis.normal(&axis.penalty(3), cells);
-    stripes(values, width).into_par_iter().try_for_each(|mut stripe| {
+    let normal = axis.normal(cells);
+    let stripes = stripes(values, width).into_par_iter().zip(domain.columns.par_chunks(LANES));
+    stripes.try_for_each(|(mut stripe, runs)| {
         control.check()?;
-        let mut lines = vec![[0.0; LANES]; stripe.len()];
-        for (lanes, piece) in lines.iter_mut().zip(&stripe) {
-            lanes[..piece.len()].copy_from_slice(piece);
-        }
-        let mut x = axis.project(&lines);
-        normal.solve(&mut x);
-        for (piece, lanes) in stripe.iter_mut().zip(&x) {
-            piece.copy_from_slice(&lanes[..piece.len()]);
+        if runs.iter().all(|of_column| *of_column == runs[0]) {
+            solve_stripe::<LANES>(&normal, &mut stripe, 0..runs.len(), &runs[0]);
+        } else {
+            for (column, runs) in runs.iter().enumerate() {
+                solve_stripe::<1>(&normal, &mut stripe, column..column + 1, runs);
+            }
         }
         Ok(())
     })
 }
 
+/// Fits at most `W` columns of a stripe side by side, on runs of knots that they share.
+fn solve_stripe<const W: usize>(
+    normal: &Normal<'_>,
+    stripe: &mut [&mut [f64]],
+    columns: Range<usize>,
+    runs: &[Range<usize>],
+) {
+    for run in runs {
+        let section = normal.section(run);
+        let mut lanes = vec![[0.0; W]; section.nodes.len()];
+        for (lanes, piece) in lanes.iter_mut().zip(&stripe[section.nodes.clone()]) {
+            lanes[..columns.len()].copy_from_slice(&piece[columns.clone()]);
+        }
+        let x = section.fit(&lanes);
+        for (piece, lanes) in stripe[run.clone()].iter_mut().zip(&x) {
+            piece[columns.clone()].copy_from_slice(&lanes[..columns.len()]);
+        }
+    }
+}
+
 /// Stripes of [`LANES`] columns as lists of row pieces, so that threads can write them without overlap.
-pub(in crate::surface) fn stripes(values: &mut [f64], width: usize) -> Vec<Vec<&mut [f64]>> {
+fn stripes(values: &mut [f64], width: usize) -> Vec<Vec<&mut [f64]>> {
     let rows = values.len() / width;
     let mut stripes: Vec<_> =
         (0..width.div_ceil(LANES)).map(|_| Vec::with_capacity(rows)).collect();

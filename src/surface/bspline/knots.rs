@@ -20,6 +20,15 @@ pub(in crate::surface) struct FitPlan {
 }
 
 impl FitPlan {
+    /// Knots per node along columns and rows.
+    pub(in crate::surface) fn density(&self, frame: &GridFrame) -> DVec2 {
+        let [x, y] = [(0, frame.cols()), (1, frame.rows())].map(|(axis, nodes)| match nodes {
+            1 => 1.0,
+            _ => self.intervals[axis] as f64 / (nodes - 1) as f64,
+        });
+        DVec2::new(x, y)
+    }
+
     /// Knots at all nodes: the spline interpolates.
     pub(in crate::surface) fn every_node(frame: &GridFrame, degree: usize) -> Self {
         Self { degree, intervals: [frame.cols() - 1, frame.rows() - 1], cutoff: 0.0 }

@@ -25,7 +25,10 @@ pub(in crate::surface) fn residuals(frame: &GridFrame, fit: &Fit, heights: &[f64
         .map_init(
             || vec![0.0; frame.cols()],
             |values, (row, heights)| {
-                fit.row_values(row, values);
+                let first = heights.iter().position(|z| z.is_finite());
+                let last = heights.iter().rposition(|z| z.is_finite());
+                let (Some(first), Some(last)) = (first, last) else { return Default::default() };
+                fit.row_values(row, first..last + 1, values);
                 RowResiduals::new(values, heights)
             },
         )

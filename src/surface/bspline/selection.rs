@@ -2,10 +2,9 @@
 
 use glam::DVec2;
 
-use super::fit::Fit;
 use super::knots::FitPlan;
 use super::residuals::residuals;
-use super::voids::fill;
+use super::voids::fit_finite;
 use crate::control::Control;
 use crate::error::Result;
 use crate::grid::GridFrame;
@@ -25,7 +24,6 @@ pub(in crate::surface) fn fewest_knots(
     control: &Control,
 ) -> Result<FitPlan> {
     let quiet = control.quiet();
-    let filled = fill(frame, heights, &FitPlan::every_node(frame, degree), &quiet)?;
     // As many intervals as the finer cells fit along the longer side: knots at every node, which
     // interpolate, so the upper end always meets the tolerance.
     let cells = DVec2::new((frame.cols() - 1) as f64, (frame.rows() - 1) as f64);
@@ -35,7 +33,7 @@ pub(in crate::surface) fn fewest_knots(
     while few < enough {
         let middle = few.midpoint(enough);
         let plan = FitPlan::coarse(frame, degree, middle);
-        let fit = Fit::new(frame, &filled, &plan, &quiet)?;
+        let fit = fit_finite(frame, heights, &plan, &quiet)?;
         if residuals(frame, &fit, heights).rms <= rms {
             enough = middle;
         } else {
@@ -56,10 +54,9 @@ pub(in crate::surface) fn cross_validate(
     let quiet = control.quiet();
     let (frame, heights) = window(frame, heights)?;
     let cell = mean_cell(&frame);
-    let filled = fill(&frame, &heights, &FitPlan::every_node(&frame, degree), &quiet)?;
     let score = |log_cells: f64| {
         let plan = FitPlan::smooth(&frame, degree, log_cells.exp2() * cell);
-        generalised_cross_validation(&frame, &heights, &filled, &plan, &quiet)
+        generalised_cross_validation(&frame, &heights, &plan, &quiet)
     };
     let longest = (frame.cols().max(frame.rows()) as f64 / 2.0).log2().max(2.0) as usize;
     let mut best = (f64::INFINITY, 1.0);
@@ -79,16 +76,14 @@ pub(in crate::surface) fn cross_validate(
 ///   GCV = N Σ(s − z)² / (N − tr A)² ,     tr A = tr A_x · tr A_y
 /// ```
 ///
-/// where `A = A_y ⊗ A_x` takes heights to fitted heights, a separable fit's trace being the product. `filled` are the heights
-/// with voids filled in. Infinite where the fit has as much freedom as there are heights.
+/// where `A = A_y ⊗ A_x` takes heights to fitted heights, a separable fit's trace being the product. Infinite where the fit has as much freedom as there are heights.
 fn generalised_cross_validation(
     frame: &GridFrame,
     heights: &[f64],
-    filled: &[f64],
     plan: &FitPlan,
     control: &Control,
 ) -> Result<f64> {
-    let fit = Fit::new(frame, filled, plan, control)?;
+    let fit = fit_finite(frame, heights, plan, control)?;
     let valid = heights.iter().filter(|z| z.is_finite()).count() as f64;
     let [x, y] = (plan.cutoff / frame.mid_spacing()).to_array();
     let freedom = valid * (1.0 - fit.x.trace(x) * fit.y.trace(y) / frame.nodes() as f64);

@@ -49,7 +49,8 @@ pub struct HeightSurface {
 }
 
 impl HeightSurface {
-    /// Fits a terrain. Voids have no weight.
+    /// Fits a terrain. Into voids the surface goes on for a few cells, and ends there as it does at the border of the grid; time
+    /// goes by the heights that are not void.
     ///
     /// # Errors
     /// [`Error::Argument`] if all heights are void, or a cut-off or tolerance is not positive and finite; [`Error::Cancelled`].
@@ -117,7 +118,7 @@ impl HeightSurface {
         &self.frame
     }
 
-    /// Height in metres at grid coordinates, clamped to the hull of the nodes.
+    /// Height in metres at grid coordinates, clamped to the hull of the nodes; not a number far from all heights.
     #[must_use]
     pub fn height(&self, at: DVec2) -> f64 {
         let [z] = self.derivatives(self.frame.clamp(at), [[0, 0]]);
@@ -129,7 +130,7 @@ impl HeightSurface {
         self.fit.derivatives(at + DVec2::new(self.margin as f64, 0.0), orders)
     }
 
-    /// Height and derivatives at grid coordinates, clamped to the hull of the nodes.
+    /// Height and derivatives at grid coordinates, clamped to the hull of the nodes; not numbers far from all heights.
     #[must_use]
     pub fn jet(&self, at: DVec2) -> HeightJet {
         let at = self.frame.clamp(at);
@@ -148,22 +149,28 @@ impl HeightSurface {
     }
 
     /// Jets at all nodes of a row, into the first [`cols`](GridFrame::cols) of `jets`: much faster than
-    /// one by one.
+    /// one by one. Those of voids mean nothing, and are 0 far from all heights.
     ///
     /// # Panics
     /// If `jets` is shorter than a row, or there is no such row.
     pub fn row_jets(&self, row: usize, jets: &mut [HeightJet]) {
         let mut block = HeightBlock::default();
+        let known = self.fit.domain.nodes_at(row, self.fit.x.nodes.len());
         for (i, jets) in jets[..self.frame.cols()].chunks_mut(BLOCK).enumerate() {
-            let col = self.margin + i * BLOCK;
-            self.fit.jets(&self.per_metre, col, row..row + 1, false, &mut block);
+            let first = self.margin + i * BLOCK;
+            let end = first + jets.len();
+            if !known.iter().any(|run| run.start < end && run.end > first) {
+                jets.fill(HeightJet::default());
+                continue;
+            }
+            self.fit.jets(&self.per_metre, first, row..row + 1, false, &mut block);
             for (i, jet) in jets.iter_mut().enumerate() {
                 *jet = block.jet(0, i);
             }
         }
     }
 
-    /// Whether the node was a void of the terrain: the surface there is only a continuation.
+    /// Whether the node was a void of the terrain: the surface there is only a continuation, of a few cells.
     #[must_use]
     pub fn is_void(&self, col: usize, row: usize) -> bool {
         self.has_voids() && self.voids[self.frame.index(col, row)]
@@ -207,8 +214,7 @@ impl HeightSurface {
         let (first, mut jets) = (band * BLOCK, HeightBlock::default());
         let (mut sums, mut count) = ([0.0; 2], 0);
         for col in (0..cols).step_by(BLOCK) {
-            let band = first..rows.min(first + BLOCK);
-            self.fit.jets(&self.per_metre, self.margin + col, band, false, &mut jets);
+            let before = count;
             let mut map_areas = [[0.0; BLOCK]; BLOCK];
             for (row, map_areas) in (first..rows).zip(&mut map_areas) {
                 let cell = share(row, rows, false) / self.per_metre[row].element_product();
@@ -219,6 +225,11 @@ impl HeightSurface {
                     }
                 }
             }
+            if count == before {
+                continue;
+            }
+            let band = first..rows.min(first + BLOCK);
+            self.fit.jets(&self.per_metre, self.margin + col, band, false, &mut jets);
             let [square, area] = simd::dispatch(BlockSums { jets: &jets, map_areas: &map_areas });
             sums = [sums[0] + square, sums[1] + area];
         }
