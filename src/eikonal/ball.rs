@@ -263,7 +263,7 @@ mod tests {
             let (mut held, mut solved, mut opened) = (0, 0, 0);
             for seed in seeds(&field) {
                 let nodes = ball(&mut balls, seed, radius);
-                let tile = |(place, _)| field.tiling.place(place % 400, place / 400).0;
+                let tile = |(place, _)| field.tiling.locate(place % 400, place / 400).0;
                 held += nodes.len();
                 let reached: BTreeSet<usize> = nodes.into_iter().map(tile).collect();
                 let is_beside = |tile, tiles: &BTreeSet<usize>| {

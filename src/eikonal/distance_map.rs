@@ -95,7 +95,7 @@ impl DistanceMap {
     /// [`Accuracy::High`](super::Accuracy::High).
     #[must_use]
     pub fn error_at_node(&self, col: usize, row: usize) -> Option<f64> {
-        let (tile, place) = self.field.tiling.place(col, row);
+        let (tile, place) = self.field.tiling.locate(col, row);
         let error = self.correction.as_ref()?.error_left(tile, place, self.value(col, row));
         self.is_reached(col, row).then_some(f64::from(error) / self.field.root_scale())
     }
@@ -114,7 +114,7 @@ impl DistanceMap {
     pub fn row(&self, row: usize, line: &mut [f32]) {
         let cols = self.cols().min(line.len());
         for (i, line) in line[..cols].chunks_mut(SIDE).enumerate() {
-            let (tile, first) = self.field.tiling.place(i * SIDE, row);
+            let (tile, first) = self.field.tiling.locate(i * SIDE, row);
             let values = self.values.tile(tile);
             for (place, distance) in (first..).zip(line) {
                 let value = values[place] + self.correction_at(tile, place);
@@ -192,7 +192,7 @@ impl DistanceMap {
 
     /// Value at a node in the field's stored units, corrected.
     pub(super) fn value(&self, col: usize, row: usize) -> f32 {
-        let (tile, place) = self.field.tiling.place(col, row);
+        let (tile, place) = self.field.tiling.locate(col, row);
         self.values.at(tile, place) + self.correction_at(tile, place)
     }
 
@@ -221,14 +221,14 @@ impl DistanceMap {
     }
 
     pub(crate) fn is_reached(&self, col: usize, row: usize) -> bool {
-        let (tile, place) = self.field.tiling.place(col, row);
+        let (tile, place) = self.field.tiling.locate(col, row);
         self.values.at(tile, place) < UNREACHED
     }
 
     /// Stored value at a node, modulo the size of the grid where it is periodic; `None` outside and where not reached.
     pub(crate) fn reached(&self, col: isize, row: isize) -> Option<f64> {
         let (col, row) = self.field.tiling.node(col, row)?;
-        let (tile, place) = self.field.tiling.place(col, row);
+        let (tile, place) = self.field.tiling.locate(col, row);
         let value = self.values.at(tile, place);
         (value < UNREACHED).then(|| (value + self.correction_at(tile, place)).into())
     }

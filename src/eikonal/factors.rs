@@ -121,7 +121,7 @@ impl Factors {
         col: usize,
         row: usize,
     ) -> Option<(&Factor, DVec2, [f64; 8])> {
-        let factor = self.of_tile(field.tiling.place(col, row).0)?;
+        let factor = self.of_tile(field.tiling.locate(col, row).0)?;
         let v = DVec2::new(col as f64, row as f64) - factor.at;
         let terms = factor.terms(v, field.metric(col, row)?.inverse())?;
         Some((factor, v, terms))

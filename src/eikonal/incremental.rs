@@ -92,7 +92,7 @@ impl Solver {
             };
             let nodes = nodes.iter().flat_map(around);
             let nodes = nodes.filter_map(|(col, row)| field.tiling.node(col, row));
-            let mut places: Vec<_> = nodes.map(|(c, r)| field.tiling.place(c, r)).collect();
+            let mut places: Vec<_> = nodes.map(|(c, r)| field.tiling.locate(c, r)).collect();
             places.sort_unstable();
             places.dedup();
             Ok(places)

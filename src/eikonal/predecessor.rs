@@ -49,7 +49,7 @@ pub(super) fn predecessors(field: &TensorField, factors: &Factors, store: &Memor
     let tiling = field.tiling;
     let mut predecessors = vec![NOWHERE; tiling.cols * tiling.rows];
     let value = |col: usize, row: usize| {
-        let (tile, place) = tiling.place(col, row);
+        let (tile, place) = tiling.locate(col, row);
         store.values.at(tile, place)
     };
     let rows = predecessors.par_chunks_mut(tiling.cols.max(1)).enumerate();

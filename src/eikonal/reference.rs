@@ -29,7 +29,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
     let seeds = source::seeds(&field, starts)?;
     let store = MemoryStore::seeded(&field, &seeds);
     let value = |col, row| {
-        let (tile, place) = field.tiling.place(col, row);
+        let (tile, place) = field.tiling.locate(col, row);
         store.values.at(tile, place)
     };
     let (cols, rows) = (field.cols(), field.rows());
@@ -42,7 +42,7 @@ pub fn solve(field: TensorField, starts: &[StartRegion], control: &Control) -> R
             let row = if sweep & 2 == 0 { j } else { rows - 1 - j };
             for i in 0..cols {
                 let col = if sweep & 1 == 0 { i } else { cols - 1 - i };
-                let (tile, place) = field.tiling.place(col, row);
+                let (tile, place) = field.tiling.locate(col, row);
                 let old = store.values.at(tile, place);
                 let new = best_foot(&field, &factors, value, col, row)
                     .map_or(f32::INFINITY, |(g, _)| g as f32);

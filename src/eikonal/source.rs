@@ -84,7 +84,7 @@ pub(super) fn add_seeds(
 ) -> Result<Vec<usize>> {
     let mut tiles = Vec::new();
     seed_all(field, starts, |col, row, value, _| {
-        let (tile, place) = field.tiling.place(col, row);
+        let (tile, place) = field.tiling.locate(col, row);
         let seeds = seeds[tile].get_or_insert_with(|| {
             tiles.push(tile);
             Box::new([f32::INFINITY; AREA])

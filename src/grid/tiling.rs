@@ -79,7 +79,7 @@ impl Tiling {
     }
 
     /// Tile of a node, and its place there: row-major among the nodes of the tile.
-    pub(crate) fn place(&self, col: usize, row: usize) -> (usize, usize) {
+    pub(crate) fn locate(&self, col: usize, row: usize) -> (usize, usize) {
         ((row / SIDE) * self.across + col / SIDE, (row % SIDE) * SIDE + col % SIDE)
     }
 
@@ -112,7 +112,7 @@ impl Tiling {
     pub(crate) fn seen_from(&self, tile: usize, col: isize, row: isize) -> Option<(usize, usize)> {
         let (x, y) = (tile % self.across, tile / self.across);
         let (col, row) = self.node((x * SIDE) as isize + col, (y * SIDE) as isize + row)?;
-        Some(self.place(col, row))
+        Some(self.locate(col, row))
     }
 
     /// The tile `(dx, dy)` from another.

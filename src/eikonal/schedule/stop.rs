@@ -125,7 +125,7 @@ impl<S: TileStore> Progress<'_, S> {
         let node = |(c, r)| field.tiling.node(c, r).filter(|&(c, r)| field.is_open(c, r));
         let mut all = None;
         for (col, row) in corners.into_iter().filter_map(node) {
-            let (tile, place) = field.tiling.place(col, row);
+            let (tile, place) = field.tiling.locate(col, row);
             let step = self.store.limits(tile)?.longest_step;
             let last = self.store.value(tile, place)? + step.max(self.margin) + self.margin;
             all = Some(all.unwrap_or(true) && last < self.least_change);

@@ -3,7 +3,7 @@
 #![allow(clippy::needless_range_loop, reason = "lanes of several arrays go together")]
 
 use super::first_order::FirstOrder;
-use super::functional::{FactorAt, Foot};
+use super::functional::{FactorAt, Functional};
 use super::halo::{BatchBlock, MARGIN, WIDTH, at_offset, fill, rings_of};
 use super::triangle::LaneTriangle;
 use crate::eikonal::stencil::UNREACHED;
@@ -460,7 +460,7 @@ fn find_line<const T: usize, const IS_FACTORED: bool>(
         let [beside, opposite] = triangle.diagonals(ring);
         let far_ahead = triangle.side(ahead[0][i], ahead[1][i], ahead[2][i], ahead[3][i]);
         let far_behind = triangle.side(behind[0][i], behind[1][i], behind[2][i], behind[3][i]);
-        let foot = Foot {
+        let functional = Functional {
             rise: [
                 triangle.axis(ring),
                 beside,
@@ -491,9 +491,9 @@ fn find_line<const T: usize, const IS_FACTORED: bool>(
             known: choose(before.triangle[i] == bits, before.theta[i], -1.0),
         };
         let minimum = if T == 1 {
-            foot.minimise::<IS_FACTORED, false>()
+            functional.minimise::<IS_FACTORED, false>()
         } else {
-            foot.minimise::<IS_FACTORED, true>()
+            functional.minimise::<IS_FACTORED, true>()
         };
         // Beyond the seam of a periodic grid a value can be read, but belongs to another tile.
         let fixed = (seeds[i] < UNREACHED) | (g[i] >= UNREACHED) | (dets[i] == 0.0);

@@ -80,9 +80,9 @@ impl FactorAt {
     }
 }
 
-/// What a node's functional is made of.
+/// The functional of second order at a node, in a triangle.
 #[derive(Clone, Copy)]
-pub(super) struct Foot {
+pub(super) struct Functional {
     /// By how much the values at (1, 0), (1, 1), (1, −1) and (1, 2) exceed that of the node; a large number where unreached.
     pub(super) rise: [f32; 4],
     /// `g(b) − g(a)` as the first-order update reads it, factoring terms included.
@@ -118,7 +118,7 @@ pub(super) struct Minimum {
     pub(super) length: f32,
 }
 
-impl Foot {
+impl Functional {
     /// The minimum after a step of Newton's method.
     #[inline(always)]
     pub(super) fn minimise<const IS_FACTORED: bool, const IS_WEIGHTED: bool>(self) -> Minimum {

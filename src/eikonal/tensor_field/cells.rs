@@ -85,8 +85,8 @@ impl TensorField {
         let nodes =
             around.filter_map(|(i, j)| self.tiling.node(col as isize + i, row as isize + j));
         let tiles: BTreeSet<usize> =
-            nodes.map(|(col, row)| self.tiling.place(col, row).0).collect();
-        let own = self.tiling.place(col, row);
+            nodes.map(|(col, row)| self.tiling.locate(col, row).0).collect();
+        let own = self.tiling.locate(col, row);
         for tile in tiles {
             let places: Vec<_> = self.tiling.places_around(tile).collect();
             for at in (0..places.len()).filter(|&at| places[at] == Some(own)) {

@@ -219,7 +219,7 @@ impl TensorField {
             return Err(too_far(col, row, 1));
         }
         let stored = |value: f64| if fits { value as f32 } else { 0.0 };
-        let (tile, place) = self.tiling.place(col, row);
+        let (tile, place) = self.tiling.locate(col, row);
         let tile = &mut self.tiles[tile];
         tile.xx[place] = stored(d.xx);
         tile.xy[place] = stored(d.xy);
@@ -233,7 +233,7 @@ impl TensorField {
     /// Whether the node may be entered.
     #[must_use]
     pub fn is_open(&self, col: usize, row: usize) -> bool {
-        let (tile, place) = self.tiling.place(col, row);
+        let (tile, place) = self.tiling.locate(col, row);
         self.tiles[tile].det[place] > 0.0
     }
 
@@ -259,7 +259,7 @@ impl TensorField {
 
     /// Stored metric `M = D⁻¹` of a node in index coordinates; `None` where closed.
     pub(super) fn metric(&self, col: usize, row: usize) -> Option<Sym2> {
-        let (tile, place) = self.tiling.place(col, row);
+        let (tile, place) = self.tiling.locate(col, row);
         let tile = &self.tiles[tile];
         let (xx, xy, det) =
             (f64::from(tile.xx[place]), f64::from(tile.xy[place]), f64::from(tile.det[place]));
@@ -275,7 +275,7 @@ impl TensorField {
     /// The cost of a node by which steps are weighted; `None` where closed.
     pub(super) fn cost(&self, col: isize, row: isize) -> Option<f64> {
         let (col, row) = self.tiling.node(col, row)?;
-        let (tile, place) = self.tiling.place(col, row);
+        let (tile, place) = self.tiling.locate(col, row);
         let cost = self.weights(tile).map_or(1.0, |w| w.cost[place / SIDE + 1][place % SIDE + 1]);
         self.is_open(col, row).then_some(cost.into())
     }
@@ -348,7 +348,7 @@ mod tests {
                 let by = frame.spacing(row as f64) * DVec2::new(1.0, -1.0) * field.root_scale();
                 let d =
                     metric.speed(DVec2::new(col as f64, row as f64)).unwrap().rescale(by.recip());
-                let (tile, i) = field.tiling.place(col, row);
+                let (tile, i) = field.tiling.locate(col, row);
                 let tile = field.tensors(tile);
                 let [xx, xy, det] = [tile.xx[i], tile.xy[i], tile.det[i]].map(f64::from);
                 largest = largest

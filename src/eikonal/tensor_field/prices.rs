@@ -85,7 +85,7 @@ impl TensorField {
 
     /// What steps from a node cost.
     pub(crate) fn steps(&self, col: usize, row: usize) -> Steps {
-        let (tile, place) = self.tiling.place(col, row);
+        let (tile, place) = self.tiling.locate(col, row);
         let node = [place % SIDE, place / SIDE];
         let Some(cells) = self.cells.get(tile) else {
             let metric = self.metric(col, row);
