@@ -155,6 +155,24 @@ fn distances_obey_the_triangle_inequality() {
 }
 
 #[test]
+fn islands_far_from_the_corner_of_the_grid_are_climbed() {
+    let middle = DVec2::new(50.0, 30.0);
+    let is_land = |i: usize| middle.distance(DVec2::new((i % N) as f64, (i / N) as f64)) < 20.0;
+    let heights = heights(N).into_iter().enumerate();
+    let island = heights.map(|(i, z)| if is_land(i) { z } else { f64::NAN }).collect();
+    let control = Control::default();
+    let surface = HeightSurface::fit(&square(N, island), &FitOptions::default(), &control).unwrap();
+    let modifiers = Modifiers { climb_weight: 10.0, ..Modifiers::default() };
+    let field = Isotropic.on(&surface, &modifiers, &control).unwrap();
+    let map = Solver::default().solve(&field, &[middle.into()], &Stop::Never, &control).unwrap();
+    let reached = map.to_row_major().iter().filter(|g| g.is_finite()).count();
+    assert_eq!(reached, (0..N * N).filter(|&i| is_land(i)).count());
+    let goal = DVec2::new(62.0, 38.0);
+    let cost = trace(&map, &field, goal).unwrap().summary.cost;
+    assert!((map.at(goal).unwrap() / cost - 1.0).abs() < 0.03);
+}
+
+#[test]
 fn stretched_cells_give_the_same_distances_at_the_same_places() {
     // The same hills on square cells and on cells twice as high as wide.
     let hills = Synthetic::new(SyntheticKind::Bumps, 161, 161, 5.0).unwrap();

@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::TensorField;
-use super::prices::WeightTile;
+use super::prices::{TensorTile, WeightTile};
 use crate::grid::tiling::{AREA, PADDED, SIDE};
 use crate::metric::MetricField;
 use crate::surface::{Block, Jet, JetBlock, Surface};
@@ -32,10 +32,19 @@ impl TensorField {
         self.weights = (0..tiling.tiles()).into_par_iter().map(weights).collect();
     }
 
+    /// Column and row of an open node.
+    fn first_open(&self) -> Option<(usize, usize)> {
+        let place = |tile: &TensorTile| tile.det.iter().position(|&det| det > 0.0);
+        let (tile, place) =
+            self.tiles.iter().enumerate().find_map(|(i, tile)| Some((i, place(tile)?)))?;
+        Some(self.tiling.node_at(tile, place))
+    }
+
     /// Heights times `climb`, tile by tile.
     fn rises(&self, surface: &dyn Surface, climb: f64) -> Vec<[f32; AREA]> {
-        // Only differences count; `f32` holds those of heights above the first node best.
-        let level = surface.point(DVec2::ZERO).z;
+        // Only differences count; `f32` holds those of heights above one that is typical best.
+        let Some((col, row)) = self.first_open() else { return Vec::new() };
+        let level = surface.point(DVec2::new(col as f64, row as f64)).z;
         let tile = |jets: &mut JetBlock, tile: usize| {
             let mut rises = [0.0; AREA];
             let (col, row) = self.tiling.node_at(tile, 0);
@@ -46,7 +55,9 @@ impl TensorField {
                     Jet::Height(jet) => jet.z,
                     Jet::Space(jet) => jet.point.z,
                 };
-                rises[j * SIDE + i] = ((z - level) * climb) as f32;
+                // In the middle of voids there is no surface.
+                let above = if z.is_finite() { z - level } else { 0.0 };
+                rises[j * SIDE + i] = (above * climb) as f32;
             }
             rises
         };
